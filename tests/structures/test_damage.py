@@ -8,7 +8,6 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from rigwatch.structures.damage.detector import innovations
 from rigwatch.structures.damage.examination import Examination, Settings, examine
 from rigwatch.structures.model.checks import load_structure
 from rigwatch.structures.model.description import Structure, coefficients
@@ -99,19 +98,6 @@ def test_identified_figures_do_not_raise_false_alarms(kabe: Structure) -> None:
         alarms += found.watches[0].alarm is not None
     # With 5 % a record, more than two of eight have a chance of 0.6 %.
     assert alarms <= 2
-
-
-def test_innovations_of_a_wrong_figure_are_white() -> None:
-    random = np.random.default_rng(2)
-    slopes = np.sin(np.arange(200.0)[:, None, None] * np.array([0.1, 0.17])) * np.ones((1, 3, 1))
-    spread = np.array([[4.0, 1.0], [1.0, 9.0]])
-    energies = []
-    for _ in range(200):
-        theta = random.multivariate_normal(np.zeros(2), spread)
-        residual = slopes @ theta + random.standard_normal((200, 3))
-        energies.append(np.sum(innovations(residual, slopes, spread) ** 2))
-    assert np.mean(energies) == pytest.approx(600.0, rel=0.02)
-    assert np.var(energies) == pytest.approx(1200.0, rel=0.4)
 
 
 def test_damages_in_sequence_are_found_one_after_the_other(kabe: Structure) -> None:

@@ -1,8 +1,9 @@
 """Damage of a structure: when it begins, which spring is damaged, and what stiffness remains."""
 
 from rigwatch.structures.damage import signals
-from rigwatch.structures.damage.detector import Innovations, rounded
+from rigwatch.structures.damage.detector import rounded
 from rigwatch.structures.damage.examination import Damage, Examination, Settings, examine
+from rigwatch.structures.damage.innovations import Innovations
 from rigwatch.structures.damage.location import Ranking
 from rigwatch.structures.damage.signals import band, loudest, pieces
 from rigwatch.structures.damage.spring_model import FINER

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigwatch.structures.damage.innovations import Innovations
 from rigwatch.structures.damage.spring_model import SpringModel
 from rigwatch.structures.damage.threshold import CumulativeSum, threshold_for
 from rigwatch.wire.arrays import FloatArray
@@ -79,6 +80,7 @@ class Judge:
         last: int,
         *,
         spread: FloatArray | None = None,
+        learnt: int = 0,
     ) -> Watch:
         """Run the model in parallel with the record.
 
@@ -89,12 +91,14 @@ class Judge:
             first, last: the range [samples].
             spread: covariance of the springs' coefficients and the state, shape (c + n, c + n);
                 None if they are known.
+            learnt: sample before which the record was used to find them.
         """
         run = model.run(parameters, state, first, last)
         residual = run.outputs - model.observed[first:last]
         scaled = residual / self.sigma
         if spread is not None and np.any(spread) and self.limit is None:
-            scaled = innovations(scaled, run.slopes / self.sigma[:, None], spread)
+            filtered = Innovations(model, parameters, state, spread, self.sigma)
+            scaled = filtered.along(model, first, last, learnt)
         statistic, threshold, alarm = self.judge(residual, scaled, first)
         return Watch(first, residual, run.states, statistic, threshold, alarm)
 
@@ -116,60 +120,6 @@ class Judge:
                 alarm = Alarm(first + k, first + k + 1 - adding.zero)
             statistic[k] = adding.value
         return statistic, threshold, alarm
-
-
-def innovations(scaled: FloatArray, slopes: FloatArray, spread: FloatArray) -> FloatArray:
-    """The part of the residuals that past samples and parameter uncertainty do not explain.
-
-    A parameter error θ moves all residuals together, by slopes·θ, so they are not independent.
-    Updating the estimate of θ sample by sample leaves independent innovations (R. E. Kalman,
-    1960); each is divided by the root of its covariance.
-
-    Args:
-        scaled: residuals over their standard deviation, NaN where missing, shape (samples, m).
-        slopes: derivatives by θ, scaled alike, shape (samples, m, p).
-        spread: covariance of θ, shape (p, p).
-
-    Returns:
-        Shape (samples, m), standard deviation 1 and independent if they are only noise.
-    """
-    filtered, found = Innovations(spread), np.empty(scaled.shape)
-    for k, row in enumerate(scaled):
-        found[k] = filtered.update(row, slopes[k])
-    return found
-
-
-class Innovations:
-    """`innovations` one sample at a time.
-
-    Args:
-        spread: covariance of the parameter errors θ, shape (p, p).
-    """
-
-    def __init__(self, spread: FloatArray) -> None:
-        self._used = np.flatnonzero(np.diag(spread) > 0)
-        # In units of their standard deviations: stiffnesses and positions differ by many orders.
-        self._size = np.sqrt(np.diag(spread)[self._used])
-        self._covariance = spread[np.ix_(self._used, self._used)] / np.outer(self._size, self._size)
-        self._theta = np.zeros(len(self._used))
-
-    def update(self, scaled: FloatArray, slopes: FloatArray) -> FloatArray:
-        """One sample's innovations (m,) from scaled residuals (m,) and slopes (m, p)."""
-        found, seen = np.full(scaled.shape, np.nan), np.isfinite(scaled)
-        if not seen.any():
-            return found
-        if not len(self._used):
-            return scaled
-        along = slopes[np.ix_(seen, self._used)] * self._size
-        across = self._covariance @ along.T
-        root = np.linalg.cholesky(along @ across + np.eye(int(seen.sum())))
-        new = np.linalg.solve(root, scaled[seen] - along @ self._theta)
-        gain = np.linalg.solve(root, across.T)
-        self._theta = self._theta + gain.T @ new
-        left = self._covariance - gain.T @ gain
-        self._covariance = 0.5 * (left + left.T)
-        found[seen] = new
-        return found
 
 
 def _by_limit(

@@ -146,6 +146,7 @@ class _Estimate:
     first: int
     spread: FloatArray
     figures: Mapping[str, Figure]
+    learnt: int
 
 
 @dataclass(eq=False)
@@ -160,7 +161,9 @@ class _Search:
     def run(self) -> None:
         """Monitor, identify, monitor again, to the record's end."""
         base = self.base
-        estimate = _Estimate(base.parameters, base.model.start(), 0, base.spread, base.figures)
+        estimate = _Estimate(
+            base.parameters, base.model.start(), 0, base.spread, base.figures, base.samples
+        )
         while len(self.damages) < MOST:
             watch = self._watched(estimate)
             self.watches.append(watch)
@@ -180,6 +183,7 @@ class _Search:
             estimate.first,
             len(model),
             spread=estimate.spread,
+            learnt=estimate.learnt,
         )
 
     def _identified(self, estimate: _Estimate, watch: Watch, alarm: Alarm) -> _Estimate:
@@ -201,7 +205,7 @@ class _Search:
         follow = max(ranking.first, min(when.sample, ranking.last - SHORTEST))
         return _Estimate(
             self._changed(estimate, refit), refit.state, follow, self._spread(refit),
-            {**estimate.figures, **figures},
+            {**estimate.figures, **figures}, ranking.last,
         )  # fmt: skip
 
     def _begin(self, estimate: _Estimate, path: FloatArray, watch: Watch, alarm: Alarm) -> int:
@@ -272,7 +276,13 @@ class _Search:
             return kept
         parameters, spread = self._changed(estimate, refit), self._spread(refit)
         watch = self.judge.watch(
-            self.base.model, parameters, refit.state, kept.first, end, spread=spread
+            self.base.model,
+            parameters,
+            refit.state,
+            kept.first,
+            end,
+            spread=spread,
+            learnt=kept.last,
         )
         if watch.alarm is None or watch.alarm.onset <= kept.last:
             return kept

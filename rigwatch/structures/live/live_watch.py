@@ -192,12 +192,12 @@ class _UndamagedRun:
         self.model = base.model
         system = base.model.problem.sweeper.compiled.system
         self.units = [system.model.outputs[name].unit for name in base.model.signals]
-        self._parameters, self._sigma = base.parameters, base.sigma
+        self._parameters = base.parameters
         self._state = base.model.start()
-        columns = len(base.model.candidates) + len(self._state)
-        self._slopes = np.zeros((len(self._state), columns))
-        self._slopes[:, len(base.model.candidates) :] = np.eye(len(self._state))
-        self._innovations = Innovations(base.spread)
+        self._innovations = Innovations(
+            base.model, base.parameters, self._state, base.spread, base.sigma
+        )
+        self._learnt = base.samples
         samples = rounded(round(settings.span / dt))
         threshold = threshold_for(settings.rate, len(base.sigma), samples, base.samples)
         self.judge = CumulativeSum(len(base.sigma), threshold)
@@ -210,30 +210,22 @@ class _UndamagedRun:
         if row:
             self._advance(record, row - 1)
         count = len(self.model.signals)
-        outputs, slopes = self.model.problem.sweeper.observe(
+        outputs, _ = self.model.problem.sweeper.observe(
             record.inputs, record.dt, row, self._state, self._parameters
         )
         residual = outputs[:count] - record.observed[row]
-        scaled = self._innovations.update(residual / self._sigma, self._seen(slopes[:count]))
+        scaled = self._innovations.update(
+            record.inputs, record.dt, row, record.observed[row], learnt=row < self._learnt
+        )
         over = self.judge.update(scaled)
         return np.append(residual, self.judge.value / self.judge.threshold), over
 
-    def _seen(self, output_slopes: FloatArray) -> FloatArray:
-        """Slopes of the scaled signals by coefficients and first state, shape (m, c + n)."""
-        free = len(self.model.candidates)
-        direct, by_state = output_slopes[:, :free], output_slopes[:, free:]
-        slopes = by_state @ self._slopes
-        slopes[:, :free] += direct
-        return np.asarray(slopes / self._sigma[:, None])
-
     def _advance(self, record: GrowingRecord, row: int) -> None:
-        problem, free = self.model.problem, len(self.model.candidates)
-        step = problem.sweeper.forward(
+        problem = self.model.problem
+        problem.sweeper.forward(
             record.inputs, record.dt, row, FINER * problem.substeps, self._state, self._parameters
         )
-        moved = step[:, free:] @ self._slopes
-        moved[:, :free] += step[:, :free]
-        self._slopes = moved
+        self._innovations.advance(record.inputs, record.dt, row)
 
 
 def _check(settings: LiveSettings) -> None:
