@@ -65,9 +65,13 @@ class SensorFlags:
         for channel in block.channels:
             if len(channel.quality) != len(block):
                 continue
-            clean = is_zero(channel.quality)
-            for bit, name in _names(channel.name):
-                active = none if clean else ((channel.quality & bit) != 0).astype(np.uint8)
+            names = _names(channel.name)
+            if is_zero(channel.quality) and not self._spikes.get(channel.name):
+                rest = none, channel.values, no_limit, no_limit
+                conditions += [Condition(name, *rest) for _, name in names]
+                continue
+            for bit, name in names:
+                active = ((channel.quality & bit) != 0).astype(np.uint8)
                 if bit == quality.SPIKE:
                     active = self._burst(channel.name, block.seq, active)
                 conditions.append(Condition(name, active, channel.values, no_limit, no_limit))

@@ -129,12 +129,9 @@ class Explainer:
 
 def _needed(block: EstimateBlock) -> EstimateBlock:
     """The estimates that a ranking uses: all of them take several megabytes."""
-    kept = tuple(
-        Column(column.name, column.unit, column.values.copy(), column.quality)
-        for column in block.columns
-        if column.name == "change"
-    )
-    return EstimateBlock(block.device, block.boot, block.seq, block.t_ns, kept)
+    change = block.column("change")
+    kept = Column(change.name, change.unit, change.values.copy(), change.quality)
+    return EstimateBlock(block.device, block.boot, block.seq, block.t_ns, (kept,))
 
 
 def _arrays(judged: Sequence[Judged], channels: Sequence[str]) -> tuple[FloatArray, FloatArray]:

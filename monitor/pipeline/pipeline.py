@@ -7,8 +7,6 @@ It uses no clock, bus or file, and every stage works sample by sample with carri
 samples give the same numbers to the last bit, live or in replay, for any division into blocks.
 """
 
-from itertools import pairwise
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -112,7 +110,9 @@ class Monitor:
         out = np.zeros((w.OUTPUTS, len(admitted.code)))
         reset = np.zeros(len(admitted.code), np.bool_)
         # What is usual in a gap is known from all samples before it, whatever the blocks.
-        for begin, end in pairwise(_ends_of_gaps(admitted.code)):
+        end = 0
+        while end < len(admitted.code):
+            begin, end = end, _end_of_gap(admitted.code, end)
             self._judge(admitted, begin, end, out, reset)
         result = self._result(block, admitted, out)
         reset = reset[admitted.padding :]
@@ -261,16 +261,22 @@ def _judged_by(model: RigModel) -> tuple[tuple[str, int, float, float], ...]:
     )
 
 
-def _ends_of_gaps(code: Codes) -> list[int]:
-    """Where to divide samples: their begin, the first good ones after bridged ones, their end."""
-    ends = 1 + np.flatnonzero((code[:-1] == HELD) & (code[1:] == GOOD))
-    return [0, *ends.tolist(), len(code)]
+@kernel()
+def _end_of_gap(code: Codes, begin: int) -> int:
+    """The first good sample after bridged ones, behind `begin`; else the samples' end."""
+    for k in range(begin + 1, code.size):
+        if code[k - 1] == HELD and code[k] == GOOD:
+            return k
+    return code.size
 
 
+@kernel()
 def _held_at_end(code: Codes, before: int) -> int:
     """Number of bridged samples with which the samples end, `before` of them before the first."""
-    others = np.flatnonzero(code != HELD)
-    return len(code) - 1 - int(others[-1]) if others.size else before + len(code)
+    k = code.size
+    while k > 0 and code[k - 1] == HELD:
+        k -= 1
+    return code.size - k + (before if k == 0 else 0)
 
 
 def _arming_rules(model: RigModel) -> ReferenceRules:

@@ -88,20 +88,22 @@ class RigMonitor:
             return None
         at, fresh = result.estimates, _fresh(block, result.estimates)
         found = [detector.update(fresh) for detector in self._detectors]
-        columns = at.columns + tuple(column for columns, _ in found for column in columns)
+        if found:
+            added = [column for columns, _ in found for column in columns]
+            at = replace(at, columns=(*at.columns, *added))
         more = tuple(condition for _, conditions in found for condition in conditions)
         quality = tuple(self._sensors.update(fresh))
         own = result.conditions
         if not self._friction:
             own = tuple(c for c in own if c.name.partition(".")[0] in OF_SAMPLES)
         if self._wiring is None:
-            return replace(at, columns=columns), (*own, *more, *quality)
+            return at, (*own, *more, *quality)
         wrong, wiring = self._wiring.update(fresh)
         wiring = (*wiring, *self._wiring_put_right(wiring, len(fresh)))
         if wrong is not None and wrong.any():
-            columns = tuple(_disarmed(column, wrong) for column in columns)
+            at = replace(at, columns=tuple(_disarmed(column, wrong) for column in at.columns))
             own, more = (tuple(_silenced(c, wrong) for c in part) for part in (own, more))
-        return replace(at, columns=columns), (*own, *more, *wiring, *quality)
+        return at, (*own, *more, *wiring, *quality)
 
     def _wiring_put_right(self, found: tuple[Condition, ...], n: int) -> Iterator[Condition]:
         """That a wiring alarm of an earlier check does not hold any more, in n samples."""
