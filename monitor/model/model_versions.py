@@ -7,6 +7,7 @@ model.history.jsonl       who, whether proved, when, what and why: a line for ea
 """
 
 import contextlib
+import glob
 import hashlib
 import json
 from dataclasses import asdict, dataclass
@@ -143,7 +144,8 @@ def roll_back(path: Path, t_ns: int, author: Author) -> str:
 
 def _numbers(path: Path) -> list[int]:
     found = (
-        file.name[len(path.stem) + 2 : -5] for file in path.parent.glob(f"{path.stem}.v*.toml")
+        file.name[len(path.stem) + 2 : -5]
+        for file in path.parent.glob(f"{glob.escape(path.stem)}.v*.toml")
     )
     return [int(number) for number in found if number.isdigit()]
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from rigwatch.archive.entry import DUPLICATE, THINNED, UNREADABLE
 from rigwatch.archive.layout import ALARMS, INDEX, LOSSES, SECONDS, SESSIONS
+from rigwatch.archive.one_writer import other_writer
 from rigwatch.archive.store import Store
 from rigwatch.archive.tables import (
     ALARM_COLUMNS,
@@ -24,11 +25,16 @@ Row = dict[str, Any]
 
 @dataclass(slots=True)
 class Catalogue:
-    """The rows of the three tables, sessions by their names."""
+    """The rows of the three tables, sessions by their names.
+
+    Attributes:
+        stamp: of the stored table of sessions when it was read or written last.
+    """
 
     sessions: dict[str, Row]
     alarms: list[Row]
     losses: list[Row]
+    stamp: str = ""
 
     def forget(self, names: set[str]) -> None:
         """Remove sessions with their alarms and losses."""
@@ -86,11 +92,18 @@ class Catalogue:
 
 def load(store: Store) -> Catalogue:
     """The catalogue as it is stored; empty if there is none."""
-    there = {file.name for file in store.listed(INDEX) if not file.name.startswith(SECONDS)}
+    there = _stamps(store)
     sessions, alarms, losses = (
         _read(store, name) if name in there else [] for name in (SESSIONS, ALARMS, LOSSES)
     )
-    return Catalogue({row["session"]: row for row in sessions}, alarms, losses)
+    by_name = {row["session"]: row for row in sessions}
+    return Catalogue(by_name, alarms, losses, there.get(SESSIONS, ""))
+
+
+def _stamps(store: Store) -> dict[str, str]:
+    """What changes with each table that is stored."""
+    listed = store.listed(INDEX)
+    return {file.name: file.stamp for file in listed if not file.name.startswith(SECONDS)}
 
 
 def _read(store: Store, name: str) -> list[Row]:
@@ -99,7 +112,13 @@ def _read(store: Store, name: str) -> list[Row]:
 
 
 def save(store: Store, kept: Catalogue) -> None:
-    """Write the tables; sessions last, as they say what the others hold."""
+    """Write the tables; sessions last, as they say what the others hold.
+
+    Raises:
+        ArchiveError: another process has written an object store's, or they cannot be written.
+    """
+    if not store.is_local and _stamps(store).get(SESSIONS, "") != kept.stamp:
+        raise other_writer(store)
     sessions = [kept.sessions[name] for name in sorted(kept.sessions)]
     alarms, losses = (sorted(rows, key=_order) for rows in (kept.alarms, kept.losses))
     tables = (
@@ -112,6 +131,7 @@ def save(store: Store, kept: Catalogue) -> None:
         for name, columns, rows in tables:
             write_rows(file, columns, rows)
             store.put(file, name)
+    kept.stamp = "" if store.is_local else _stamps(store).get(SESSIONS, "")
 
 
 def _without(rows: Iterable[Row], names: set[str]) -> list[Row]:

@@ -7,7 +7,7 @@ from rigwatch.archive.query import ask
 from rigwatch.archive.store import Store
 from rigwatch.wire.errors import ArchiveError, nearest
 
-_HIDDEN = ("stamp", "files")
+_HIDDEN = ("stamp", "files", "going")
 
 
 @dataclass(slots=True)

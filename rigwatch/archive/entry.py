@@ -44,7 +44,7 @@ class Entry:
     @property
     def stamp(self) -> str:
         """Changes when a file is added, removed or written."""
-        said = "".join(f"{file.name} {file.size} {file.stamp}\n" for file in self.files)
+        said = "".join(f"{file}\n" for file in self.files)
         return hashlib.sha256(said.encode()).hexdigest()[:16]
 
 

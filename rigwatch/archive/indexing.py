@@ -14,8 +14,10 @@ import msgspec
 from rigwatch.archive.catalogue import FAILED, Catalogue, Row, load, save
 from rigwatch.archive.entry import Entry, catalogued, entries
 from rigwatch.archive.layout import INDEX, SECONDS
+from rigwatch.archive.one_writer import one_writer
 from rigwatch.archive.store import Store, Stored
 from rigwatch.archive.tables import pyarrow
+from rigwatch.archive.thinning import finish_thinning
 from rigwatch.batch import Job, Outcome, map_units
 
 BATCH = 500
@@ -61,8 +63,14 @@ def index(
     """
     pyarrow()
     store.check()
-    found = {entry.name: entry for entry in entries(outside_index(store))}
+    with one_writer(store):
+        return _indexed(store, executor, say, batch)
+
+
+def _indexed(store: Store, executor: Workers, say: Say, batch: int) -> Indexed:
     kept = load(store)
+    finish_thinning(store, kept, outside_index(store))
+    found = {entry.name: entry for entry in entries(outside_index(store))}
     due = sorted(set(found) - kept.still_right({name: e.stamp for name, e in found.items()}))
     gone = kept.with_recording() - set(found)
     kept.forget(gone | set(due))

@@ -117,7 +117,8 @@ def ask(
     if until is None and "$until" in sql:
         until = _after_all(store)
     times = {"since": since or _BEGINNING, "until": until or _END}
-    given = {"rig": rig} | {name: _plain(time) for name, time in times.items()}
+    pattern = rig.replace("!", "!!").replace("_", "!_")
+    given = {"rig": pattern} | {name: _plain(time) for name, time in times.items()}
     return query(store, sql, {k: v for k, v in given.items() if f"${k}" in sql}, bounds)
 
 

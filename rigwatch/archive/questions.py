@@ -9,22 +9,24 @@ class Question:
 
     Attributes:
         text: what it answers.
-        sql: with the parameters $rig (a pattern), $since and $until (times).
+        sql: with the parameters $rig (a pattern, ! before what is literal), $since and $until.
     """
 
     text: str
     sql: str
 
 
-_IN_SPAN = "rig like $rig and time >= $since and time < $until"
-_RECORDED = 'rig like $rig and "end" >= $since and start < $until'
+_OF_RIG = "rig like $rig escape '!'"
+_IN_SPAN = f"{_OF_RIG} and time >= $since and time < $until"
+_RECORDED = f'{_OF_RIG} and "end" >= $since and start < $until'
 _SOUND = "status <> 'duplicate'"
-_LEVEL = """
+_LEVEL = f"""
     select rig, unit, sum(mean * count) / sum(count) as level, count(*) / 3600 as hours
     from seconds
-    where name = 'theta1' and rig like $rig
-      and day between ($until - interval {first} day)::date and ($until - interval {last} day)::date
-      and second >= $until - interval {first} day and second < $until - interval {last} day
+    where name = 'theta1' and {_OF_RIG}
+      and day between ($until - interval {{first}} day)::date
+      and ($until - interval {{last}} day)::date
+      and second >= $until - interval {{first}} day and second < $until - interval {{last}} day
     group by rig, unit
 """
 
@@ -71,7 +73,7 @@ QUESTIONS: dict[str, Question] = {
         "from sessions a join sessions b on a.rig = b.rig and a.session <> b.session "
         'and a.start <= b.start and b.start < a."end" '
         "and (a.start < b.start or a.session < b.session) "
-        f"where a.rig like $rig and a.{_SOUND} and b.{_SOUND} order by a.rig, b.start, a.session",
+        f"where a.{_OF_RIG} and a.{_SOUND} and b.{_SOUND} order by a.rig, b.start, a.session",
     ),
     "rigs": Question(
         "recorded hours, quality, losses and alarms of each rig",

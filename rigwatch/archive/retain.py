@@ -13,8 +13,9 @@ from itertools import groupby
 from rigwatch.archive.catalogue import FAILED, Catalogue, Row, load, save
 from rigwatch.archive.entry import THINNED, UNFINISHED, UNREADABLE, Entry, entries
 from rigwatch.archive.indexing import outside_index, remove_unused
+from rigwatch.archive.one_writer import one_writer
 from rigwatch.archive.store import Store
-from rigwatch.archive.thinning import thin
+from rigwatch.archive.thinning import finish_thinning, thin
 from rigwatch.recorder import POSITIONS, expired
 from rigwatch.wire.errors import ArchiveError, SessionError
 from rigwatch.wire.rig_config import RecorderSection
@@ -42,7 +43,7 @@ class Retained:
     Attributes:
         sessions: number in the catalogue before.
         expired: sessions that the rules remove, oldest first.
-        removed: number of them that are removed.
+        removed: number of sessions that are removed, those of a run that was stopped included.
         unknown: sessions that stay because they are new or have changed since the last index.
         undated: sessions that stay because they do not tell when they were recorded.
         failures: a sentence on each that cannot be removed.
@@ -81,22 +82,41 @@ def retain(
         ArchiveError: there is no index, or the archive cannot be read or written.
     """
     store.check()
+    now_s = (now or datetime.now(UTC)).timestamp()
+    if not remove:
+        return _found(store, _catalogue(store), rules, rig, now_s)
+    with one_writer(store):
+        kept = _catalogue(store)
+        finished = finish_thinning(store, kept, outside_index(store))
+        done = _found(store, kept, rules, rig, now_s)
+        if done.expired:
+            found = {entry.name: entry for entry in entries(outside_index(store))}
+            if keep_seconds:
+                _thin(store, kept, found, done)
+            _remove(store, kept, found, done, say)
+        done.removed += finished
+    return done
+
+
+def _catalogue(store: Store) -> Catalogue:
     kept = load(store)
     if not kept.sessions:
         raise ArchiveError(f"{store.url}: has no index, make one with rigwatch archive index")
+    return kept
+
+
+def _found(
+    store: Store, kept: Catalogue, rules: RecorderSection, rig: str | None, now_s: float
+) -> Retained:
+    """What the rules say of the sessions that are there as the catalogue knows them."""
     found = {entry.name: entry for entry in entries(outside_index(store))}
     known = [row for name, row in kept.sessions.items() if _is_same(found.get(name), row)]
     done = Retained(len(kept.sessions), unknown=sorted(set(found) - {r["session"] for r in known}))
-    now_s = (now or datetime.now(UTC)).timestamp()
     old = sorted((o for o in map(_old, known) if o and rig in (None, o.rig)), key=lambda o: o.rig)
     done.undated = sorted(one.session for one in old if one.ended < _DATED)
     old = [one for one in old if one.ended >= _DATED]
     for _, of_rig in groupby(old, key=lambda one: one.rig):
         done.expired += expired(of_rig, rules, now_s)
-    if remove and done.expired:
-        if keep_seconds:
-            _thin(store, kept, found, done)
-        _remove(store, kept, found, done, say)
     return done
 
 
@@ -140,6 +160,8 @@ def _remove(
         else:
             done.failures.append(f"{one.session}: {failure}")
     kept.forget({name for name in gone if kept.sessions[name]["status"] != THINNED})
+    for name in gone & set(kept.sessions):
+        kept.sessions[name]["going"] = None
     save(store, kept)
     remove_unused(store, kept)
     done.removed = len(gone)

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
-from uuid import uuid4
 
 from rigwatch.wire.errors import ArchiveError, MissingExtraError, one_line, reason_of
+from rigwatch.wire.new_file import new_file
 
 T = TypeVar("T")
 ATTEMPTS = 5
@@ -28,6 +28,9 @@ class Stored:
     name: str
     size: int
     stamp: str
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.size} {self.stamp}"
 
 
 class Store:
@@ -124,20 +127,13 @@ class Store:
             return
         target = Path(path)
         target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = target.with_name(f".{target.name}.{uuid4().hex[:8]}")
-        try:
-            shutil.copyfile(source, temporary)
-            temporary.replace(target)
-        except OSError as error:
-            temporary.unlink(missing_ok=True)
-            raise ArchiveError(f"{target}: cannot be written: {reason_of(error)}") from None
+        with new_file(target, replace=True, raises=ArchiveError) as part:
+            shutil.copyfile(source, part)
 
     def remove(self, name: str) -> None:
         """Remove a file, if it is there, and its folder if that is empty then."""
-        try:
+        with suppress(FileNotFoundError):
             self._again(lambda: self.files.rm_file(self.path(name)), name)
-        except FileNotFoundError:
-            return
         if self.is_local and "/" in name:
             with suppress(OSError):
                 Path(self.path(name)).parent.rmdir()

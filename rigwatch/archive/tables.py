@@ -38,6 +38,7 @@ SESSION_COLUMNS = {
     "content": _TEXT,
     "stamp": _TEXT,
     "files": _TEXTS,
+    "going": _TEXTS,
 }
 ALARM_COLUMNS = {
     "session": _TEXT,

@@ -6,12 +6,13 @@ The index has those of the estimates already; those of the samples are stored be
 
 import numpy as np
 
-from rigwatch.archive.catalogue import Row
+from rigwatch.archive.catalogue import Catalogue, Row, save
 from rigwatch.archive.entry import THINNED, Entry, stored_seconds
 from rigwatch.archive.second_aggregates import SecondAggregates
-from rigwatch.archive.store import Store
+from rigwatch.archive.store import Store, Stored
+from rigwatch.recorder import POSITIONS
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
-from rigwatch.wire.session import open_session
+from rigwatch.wire.session import SUFFIX, open_session
 
 REMARK = "its recording is removed, its figures per second are kept"
 
@@ -31,6 +32,32 @@ def thin(store: Store, entry: Entry, row: Row) -> None:
             seconds.add(_as_figures(block))
     names = stored_seconds(store, seconds, row["rig"], f"{row['content'][:16]}-samples")
     row |= {"files": [*(row["files"] or ()), *names], "status": THINNED, "remark": REMARK}
+    row["going"] = [str(file) for file in entry.files]
+
+
+def finish_thinning(store: Store, kept: Catalogue, files: list[Stored]) -> int:
+    """Remove what a thinning that was stopped has left of its recordings.
+
+    Args:
+        store: the archive.
+        kept: its catalogue, which holds all that stays of them.
+        files: those of the archive.
+
+    Returns:
+        Number of recordings whose removal is finished.
+    """
+    rows = [row for row in kept.sessions.values() if row.get("going")]
+    for row in rows:
+        going = set(row["going"])
+        names = [file.name for file in files if str(file) in going]
+        if not row["session"].endswith(SUFFIX):
+            names.append(f"{row['session']}/{POSITIONS}")
+        for name in names:
+            store.remove(name)
+        row["going"] = None
+    if rows:
+        save(store, kept)
+    return len(rows)
 
 
 def _as_figures(block: SampleBlock) -> EstimateBlock:

@@ -23,6 +23,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from types import ModuleType
 
+from rigwatch.commands.any_text import write_any_text
 from rigwatch.commands.unwinding import unwound_at_signal
 from rigwatch.version import __version__
 from rigwatch.wire.errors import RigwatchError, reason_of
@@ -77,6 +78,7 @@ def main(argv: list[str] | None = None) -> int:
     # The matrices are small: a second thread of the linear algebra would spin, and take the time
     # of the rig's other processes. NumPy reads this when a command first imports it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    write_any_text(sys.stdout, sys.stderr)
     with unwound_at_signal():
         return _run(sys.argv[1:] if argv is None else argv)
 

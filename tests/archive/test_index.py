@@ -33,7 +33,7 @@ def _table(root: Path, name: str) -> polars.DataFrame:
 
 def _files(root: Path) -> dict[str, bytes]:
     index_ = root / "rigwatch-index"
-    return {str(f.relative_to(index_)): f.read_bytes() for f in index_.rglob("*") if f.is_file()}
+    return {str(f.relative_to(index_)): f.read_bytes() for f in index_.rglob("*.parquet")}
 
 
 def test_a_row_per_session(archive):

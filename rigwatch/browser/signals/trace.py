@@ -1,5 +1,6 @@
 """One line of a chart on disk: its samples, their times and their pyramid."""
 
+import glob
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -94,7 +95,7 @@ def open_trace(folder: Path, name: str) -> Trace:
         FileNotFoundError: there is none.
     """
     samples = np.load(folder / f"{name}.npy", mmap_mode="r")
-    count = len(list(folder.glob(f"{name}.[0-9].npy")))
+    count = len(list(folder.glob(f"{glob.escape(name)}.[0-9].npy")))
     levels = [np.load(folder / f"{name}.{k}.npy", mmap_mode="r") for k in range(count)]
     times = np.load(folder / f"{name}.time.npy", mmap_mode="r")
     return Trace(Pyramid(samples, levels), times)
