@@ -1,6 +1,6 @@
 """Commissioning: a model file from recordings."""
 
 from monitor.commissioning.commission import CommissionSettings, commission
-from monitor.commissioning.scheme_choice import commission_best
+from monitor.commissioning.scheme_choice import channels_of, commission_best
 
-__all__ = ["CommissionSettings", "commission", "commission_best"]
+__all__ = ["CommissionSettings", "channels_of", "commission", "commission_best"]

@@ -13,7 +13,9 @@ from msgspec.structs import replace
 
 from monitor.commissioning.commission import CommissionSettings, commission
 from monitor.commissioning.equations import EQUATIONS, commission_equations
+from monitor.commissioning.steady_signals import CHANNELS
 from monitor.model import RigModel, SchemeSection
+from monitor.observer import base_model, force_port, layout_of
 from monitor.pipeline import Monitor
 from monitor.signals import DEPARTURE, DRY_FRICTION, OTHER_FAULT, STICTION, Recording
 from rigwatch.wire.errors import ModelError
@@ -23,6 +25,19 @@ Scheme = Literal["auto", "transfer", "equations"]
 FAULTS = (DEPARTURE, DRY_FRICTION, STICTION, OTHER_FAULT)
 LEAST_ARMED = 0.5
 """Share of a healthy recording over which a scheme must be armed."""
+
+
+def channels_of(scheme: Scheme, equations: str = EQUATIONS) -> set[str]:
+    """The channels that a scheme needs.
+
+    Raises:
+        RigwatchError: there is no such model of equations, or it cannot be watched.
+    """
+    found = set() if scheme == "equations" else set(CHANNELS)
+    if scheme != "transfer":
+        base = base_model(equations)
+        found |= set(layout_of(base, force_port(base)).channels)
+    return found
 
 
 def commission_best(
@@ -41,10 +56,11 @@ def commission_best(
         return commission(recordings, settings)
     transfer, why = (None, "equations were requested")
     if scheme == "auto":
+        say("fitting a transfer function")
         transfer, why = _transfer(recordings, settings)
         say(f"{why}; fitting the equations of {equations}")
     try:
-        found = commission_equations(recordings, equations)
+        found = commission_equations(recordings, equations, say=say)
     except ModelError as error:
         if transfer is None:
             raise ModelError(f"{why}; {error}" if scheme == "auto" else str(error)) from error

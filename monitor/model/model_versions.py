@@ -36,7 +36,7 @@ class Version(msgspec.Struct, frozen=True):
 
     Attributes:
         t_ns: of the change [ns].
-        step: "promote" or "rollback".
+        step: "commission", "promote" or "rollback".
         user: who made it.
         why: the reason, in words.
         identity: whether the user is proved by a signature; empty in older lines.
@@ -77,18 +77,18 @@ def digest_of(path: Path) -> str:
         return ""
 
 
-def install(path: Path, text: str, t_ns: int, author: Author) -> None:
-    """Install a new version and keep the previous one.
+def install(path: Path, text: str, t_ns: int, author: Author, step: str = "promote") -> None:
+    """Install a new version and keep the previous one, if there is one.
 
     Raises:
         ConfigError: a file cannot be written.
     """
     try:
-        before = path.read_text(encoding="utf-8")
-        number = max(_numbers(path), default=0) + 1
-        replace_file(_version(path, number), before)
+        if path.exists():
+            number = max(_numbers(path), default=0) + 1
+            replace_file(_version(path, number), path.read_bytes())
         replace_file(path, text)
-        _note(path, "promote", text, t_ns, author)
+        _note(path, step, text, t_ns, author)
     except OSError as error:
         raise ConfigError(path, "", reason_of(error), "a file to write") from error
 
@@ -110,16 +110,21 @@ def rewrite(path: Path, text: str, t_ns: int) -> None:
         raise ConfigError(path, "", reason_of(error), "a file to write") from error
 
 
+def newest_before(path: Path) -> Path:
+    """The file of the version before; there must be one."""
+    return _version(path, max(_numbers(path)))
+
+
 def version_before(path: Path) -> str:
     """Text of the version that a rollback restores.
 
     Raises:
         ConfigError: there is none, or it cannot be read.
     """
-    if not (numbers := _numbers(path)):
+    if not _numbers(path):
         raise ConfigError(path, "", "no version before this one", "one to roll back to")
     try:
-        return _version(path, max(numbers)).read_text(encoding="utf-8")
+        return newest_before(path).read_text(encoding="utf-8")
     except OSError as error:
         raise ConfigError(path, "", reason_of(error), "a readable file") from error
 
@@ -135,7 +140,7 @@ def roll_back(path: Path, t_ns: int, author: Author) -> str:
         undone = path.read_text(encoding="utf-8")
         replace_file(path.with_name(f"{path.stem}.undone-{_sha256(undone)[:8]}.toml"), undone)
         replace_file(path, text)
-        _version(path, max(_numbers(path))).unlink()
+        newest_before(path).unlink()
         _note(path, "rollback", text, t_ns, author)
     except OSError as error:
         raise ConfigError(path, "", reason_of(error), "a file to write") from error

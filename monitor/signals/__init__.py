@@ -28,8 +28,9 @@ from monitor.signals.conditions import (
     below,
     level,
 )
+from monitor.signals.inertia import CHANNELS as INERTIA_CHANNELS
 from monitor.signals.inertia import InertiaResidual, commission_inertia
-from monitor.signals.recordings import Recording, Role, joined
+from monitor.signals.recordings import Recording, Role, recorded
 from monitor.signals.residual import (
     ACCELERATION,
     G1,
@@ -53,6 +54,7 @@ __all__ = [
     "GAP",
     "GOOD",
     "HELD",
+    "INERTIA_CHANNELS",
     "LARGEST",
     "MODELLED",
     "MONITOR_RESET",
@@ -79,8 +81,8 @@ __all__ = [
     "below",
     "commission_inertia",
     "conditions",
-    "joined",
     "level",
     "modelled_acceleration",
+    "recorded",
     "usable",
 ]

@@ -1,5 +1,9 @@
-"""Wiring check at the start: whether position and acceleration show one and the same motion."""
+"""Wiring check: whether position and acceleration show one and the same motion.
 
+At the monitor's start (`WiringCheck`), and of recordings that a model is made of.
+"""
+
+from monitor.wiring.recorded_wiring import check_recorded
 from monitor.wiring.wiring_check import WIRING, WiringCheck
 
-__all__ = ["WIRING", "WiringCheck"]
+__all__ = ["WIRING", "WiringCheck", "check_recorded"]

@@ -116,13 +116,13 @@ class WiringCheck:
         found = motion_ratio(window[:, 0], window[:, 1], self._rate)
         if found is None:
             return
-        reason = _wrong(found)
+        reason = wrong_wiring(found)
         self._passed, self._fails = not reason, self._fails + 1 if reason else 0
         if self._fails == FAILURES:
             self._failed, self._gain, self._phase = reason, found.gain, found.phase
 
 
-def _wrong(found: MotionRatio) -> str:
+def wrong_wiring(found: MotionRatio) -> str:
     """What is wrong with the wiring; empty if it is right."""
     sized, turned = 1 / GAIN < found.gain < GAIN, abs(found.phase)
     if sized and turned > 180 - REVERSED:

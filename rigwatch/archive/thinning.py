@@ -51,7 +51,7 @@ def finish_thinning(store: Store, kept: Catalogue, files: list[Stored]) -> int:
         going = set(row["going"])
         names = [file.name for file in files if str(file) in going]
         if not row["session"].endswith(SUFFIX):
-            names.append(f"{row['session']}/{POSITIONS}")
+            names += [f"{row['session']}/{name}" for name in POSITIONS]
         for name in names:
             store.remove(name)
         row["going"] = None

@@ -37,7 +37,10 @@ EQUATIONS = "servo-pneumatic"
 
 
 def commission_equations(
-    recordings: Sequence[Recording], name: str = EQUATIONS, corner: float = 2.0
+    recordings: Sequence[Recording],
+    name: str = EQUATIONS,
+    corner: float = 2.0,
+    say: Callable[[str], None] = lambda _: None,
 ) -> RigModel:
     """The model file of the observer scheme.
 
@@ -45,6 +48,7 @@ def commission_equations(
         recordings: chirps and healthy ones; others are not used.
         name: of a shipped model, or its file.
         corner: of the high-pass of all judged signals [Hz].
+        say: called with one line at each step.
 
     Raises:
         ModelError: there is no healthy recording, rates differ, a recording is short or at rest,
@@ -60,9 +64,11 @@ def commission_equations(
     check_moves(used, [state.channel for state in measured_states(base_model(name))])
     readings, seem = [False] * len(used), _seem_to_jitter(used, name, rate)
     if seem == readings:
-        return _commissioned(used, name, corner, rate, readings)
+        return _commissioned(used, name, corner, rate, readings, say=say)
+    say("the drive's steps may jitter: fitting without and with it")
     return _quieter(
-        partial(_commissioned, used, name, corner, rate, jitters) for jitters in (readings, seem)
+        partial(_commissioned, used, name, corner, rate, jitters, say=say)
+        for jitters in (readings, seem)
     )
 
 
@@ -98,7 +104,13 @@ def _quieter(attempts: Iterable[Callable[[], RigModel]]) -> RigModel:
 
 
 def _commissioned(
-    used: Sequence[Recording], name: str, corner: float, rate: float, jitters: Sequence[bool]
+    used: Sequence[Recording],
+    name: str,
+    corner: float,
+    rate: float,
+    jitters: Sequence[bool],
+    *,
+    say: Callable[[str], None],
 ) -> RigModel:
     """The model.
 
@@ -108,10 +120,14 @@ def _commissioned(
         corner: of the high-pass [Hz].
         rate: sample rate [Hz].
         jitters: of which recordings the inputs' steps jitter.
+        say: called with one line at each step.
 
     Raises:
         ModelError: the equations do not describe the rig, or a recording is not healthy.
     """
+    say("1 of 3: parameters of the equations")
     plant = fitted_equations(used, name, corner, rate, jitters)
+    say("2 of 3: what the healthy rig leaves of them")
     parts, roles, remainder, scheme = healthy_remainder(used, plant, rate, jitters)
+    say("3 of 3: limits of the healthy rig")
     return equations_model(used, plant, remainder, scheme, parts, roles, rate)

@@ -5,11 +5,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigwatch.commands.common import print_json, say
+from rigwatch.commands.processes.model_place import check_place, install_model
 
 if TYPE_CHECKING:
     from monitor.model import RigModel
     from monitor.signals import Recording, Role
 
+TRANSFER_S, EQUATIONS_S = (3.0, 3.0), (10.0, 65.0)
+"""Time of commissioning: at least, and more for each 100 000 samples [s]."""
 HELP = "make a model file from commissioning recordings"
 EXAMPLE = (
     "  rigwatch commission --chirp sessions/chirp --healthy sessions/healthy "
@@ -52,6 +55,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="name of a shipped model or a model file, for --scheme equations and auto",
     )
     parser.add_argument(
+        "--any-wiring",
+        action="store_true",
+        help="commission although position and acceleration do not show one motion",
+    )
+    parser.add_argument(
         "--band", type=float, nargs=2, default=(1.0, 14.0), metavar=("LOW", "HIGH"),
         help="frequency range of the transfer function's fit [Hz]",
     )  # fmt: skip
@@ -61,21 +69,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """0 if the model file is written."""
+    check_place(arguments.output)
     recordings = _recordings(arguments)
     from monitor.commissioning import CommissionSettings, commission_best
-    from monitor.model import model_text
     from monitor.signals import commission_inertia
-    from rigwatch.wire.errors import ModelError
-    from rigwatch.wire.new_file import write_new
 
     if arguments.plant == "inertia":
-        model = commission_inertia(recordings, window=arguments.window, hop=arguments.hop)
+        model = commission_inertia(
+            recordings[:1] if len(arguments.healthy) == 1 else recordings,
+            window=arguments.window,
+            hop=arguments.hop,
+        )
     else:
+        _say_how_long(recordings, arguments.scheme)
         settings = CommissionSettings(
             band=tuple(arguments.band), window=arguments.window or 32, hop=arguments.hop
         )
         model = commission_best(recordings, settings, arguments.scheme, arguments.equations, say)
-    write_new(arguments.output, model_text(model), replace=True, raises=ModelError)
+    kept = install_model(arguments.output, model)
+    if kept:
+        say(f"the model before is {kept}")
     if arguments.json:
         print_json(_summary(model, arguments.output))
     else:
@@ -90,17 +103,58 @@ def _recordings(arguments: argparse.Namespace) -> "list[Recording]":
 
     if not arguments.healthy:
         raise ModelError("--healthy: found no recording, expected at least one")
+    needed = _needed(arguments)
     roles: tuple[Role, ...] = ("chirp", "healthy", "friction")
-    return [_read(role, path) for role in roles for path in getattr(arguments, role)]
+    found = [
+        one
+        for role in roles
+        for path in getattr(arguments, role)
+        for one in _read(role, path, needed)
+    ]
+    for one in found:
+        _check_wiring(one, any_wiring=arguments.any_wiring)
+    return found
 
 
-def _read(role: "Role", path: Path) -> "Recording":
-    from monitor.signals import joined
+def _needed(arguments: argparse.Namespace) -> set[str]:
+    """The channels that the model will read."""
+    from monitor.commissioning import channels_of
+    from monitor.signals import INERTIA_CHANNELS
+
+    if arguments.plant == "inertia":
+        return set(INERTIA_CHANNELS)
+    return channels_of(arguments.scheme, arguments.equations)
+
+
+def _read(role: "Role", path: Path, needed: set[str]) -> "list[Recording]":
+    from monitor.signals import recorded
     from rigwatch.wire.session import open_session
 
     say(f"reading {path} ({role})")
     session = open_session(path)
-    return joined(role, path.name, session.samples(), session.info.sample_rate_hz)
+    rate = session.info.sample_rate_hz
+    return recorded(role, path.name, session.samples(), rate, needed=needed, say=say)
+
+
+def _check_wiring(recording: "Recording", *, any_wiring: bool) -> None:
+    from monitor.wiring import check_recorded
+    from rigwatch.wire.errors import ModelError
+
+    try:
+        check_recorded(recording)
+    except ModelError as error:
+        if not any_wiring:
+            raise ModelError(f"{error}; --any-wiring commissions it all the same") from None
+        say(str(error))
+
+
+def _say_how_long(recordings: "list[Recording]", scheme: str) -> None:
+    """A rough time, from a machine of 2024; the first run also compiles kernels."""
+    lengths = [(len(next(iter(one.channels.values()))), one.sample_rate) for one in recordings]
+    seconds, samples = sum(n / rate for n, rate in lengths), sum(n for n, _ in lengths)
+    work = TRANSFER_S if scheme == "transfer" else EQUATIONS_S
+    rough = work[0] + work[1] * samples / 1e5
+    say(f"{seconds:.0f} s of recordings: this takes about {rough:.1g} s, more on a busy machine")
 
 
 def _summary(model: "RigModel", output: Path) -> dict[str, Any]:
