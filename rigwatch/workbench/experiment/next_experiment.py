@@ -1,6 +1,7 @@
 """Next experiment: the excitation that separates rivals most, predicted by simulation.
 
-Each excitation within the range driven so far is simulated with the fitted model. The rivals'
+Each excitation within the range driven so far is simulated with the fitted model; a machine without
+inputs is released from where it has been. The rivals'
 directions along that trajectory are projected off the subspace of the model's own parameters. The
 remainder
 
@@ -15,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigwatch.physics.engine.equations import Input
-from rigwatch.physics.engine.fit import initial_states
+from rigwatch.physics.engine.equations import Input, State
+from rigwatch.physics.engine.fit import initial_states, shown_states
 from rigwatch.physics.engine.score import Candidate, Projector, directions, trajectory
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
@@ -30,6 +31,8 @@ from rigwatch.workbench.study import Derived
 DURATION = 20.0
 """Length of the simulated recordings [s]."""
 MOST_SAMPLES = 8000
+RELEASES = (1.0, 0.7, 0.5, 0.3, 0.1)
+"""Deviations that a machine without inputs is released from, over the largest so far."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +41,9 @@ class Experiment:
 
     Attributes:
         shape: of the excitation, in words.
-        signal: the driven input.
-        amplitude: of the driven input, in `unit`.
-        unit: the input's unit.
+        signal: the driven input; without inputs the state that the machine is released from.
+        amplitude: of the driven input, or the state's deviation from its mean, in `unit`.
+        unit: that of the input or state.
         duration: [s].
         separation: predicted rms difference per rival, in noise floors.
         now: the same on the current recording.
@@ -63,8 +66,8 @@ def propose(bench: Bench, best: Ranked, rivals: Sequence[Ranked]) -> Experiment 
     train = bench.data.train
     now = _separation(bench, rows, train.inputs[:MOST_SAMPLES], _first_states(bench))
     found = [
-        (name, share, _separation(bench, rows, inputs, _rest(bench)))
-        for name, share, inputs in _excitations(bench)
+        (name, share, _separation(bench, rows, inputs, first))
+        for name, share, inputs, first in _excitations(bench)
     ]
     usable = [item for item in found if all(np.isfinite(v) for v in item[2].values())]
     if not usable:
@@ -78,7 +81,7 @@ def propose(bench: Bench, best: Ranked, rivals: Sequence[Ranked]) -> Experiment 
 def excitation(bench: Bench, experiment: Experiment) -> FloatArray:
     """The inputs of a proposed experiment at the recording's rate, shape (samples, inputs)."""
     share = experiment.amplitude / _amplitude(bench, experiment.signal)
-    for name, size, inputs in _excitations(bench):
+    for name, size, inputs, _ in _excitations(bench):
         if name == experiment.shape and np.isclose(size, share):
             return inputs
     raise ModelError(f"found experiment {experiment.shape!r}, expected one that was proposed here")
@@ -87,25 +90,33 @@ def excitation(bench: Bench, experiment: Experiment) -> FloatArray:
 def _worded(
     bench: Bench, name: str, share: float, separation: dict[str, float], now: dict[str, float]
 ) -> Experiment:
-    signal = _varied_input(bench)
-    driven = bench.study.model.inputs[signal]
+    signal, model = _varied(bench), bench.study.model
+    driven = model.inputs[signal] if model.inputs else bench.base.compiled.system.states[signal]
     amplitude = share * _amplitude(bench, signal)
     rival, size = min(separation.items(), key=lambda item: item[1])
+    size_of = ", amplitude" if model.inputs else " from"
     text = (
-        f"{name} of {signal}, amplitude {_in_words(amplitude, driven)}, {DURATION:g} s:"
+        f"{name} of {signal}{size_of} {_in_words(amplitude, driven)}, {DURATION:g} s:"
         f" {rival} would differ by {size:.3g} noise floors (on this recording: {now[rival]:.3g})"
     )
     return Experiment(name, signal, amplitude, driven.unit, DURATION, separation, now, text)
 
 
-def _in_words(amplitude: float, driven: Input) -> str:
+def _in_words(amplitude: float, driven: Input | State) -> str:
     """An amplitude in the unit of the model's file; a unit's offset does not apply."""
     shown = driven.shown or driven.unit
     return f"{amplitude / float(unit_of(shown).factor):.3g} {shown}"
 
 
-def _varied_input(bench: Bench) -> str:
-    """The input that is varied; in an inverse model the one whose derivatives are the others."""
+def _varied(bench: Bench) -> str:
+    """What is varied: an input, in an inverse model the one whose derivatives are the others.
+
+    Without inputs the first state that a channel shows, else the first.
+    """
+    if not bench.study.model.inputs:
+        system = bench.base.compiled.system
+        names = [n for n, state in system.states.items() if state.measured]
+        return next(iter([*names, *system.states]))
     derive = bench.study.file.derive
     if derive is not None:
         for signal in derive.signals.values():
@@ -115,26 +126,38 @@ def _varied_input(bench: Bench) -> str:
 
 
 def _amplitude(bench: Bench, signal: str) -> float:
+    if not bench.study.model.inputs:
+        at = list(bench.base.compiled.system.states).index(signal)
+        return float(np.ptp(_states(bench)[:, at]) / 2)
     column = bench.data.train.inputs[:, list(bench.study.model.inputs).index(signal)]
     return float(np.ptp(column) / 2)
 
 
-def _excitations(bench: Bench) -> Iterator[tuple[str, float, FloatArray]]:
+def _excitations(bench: Bench) -> Iterator[tuple[str, float, FloatArray, FloatArray]]:
+    """Shape in words, share of the amplitude so far, inputs, and states at the first sample."""
     dt = bench.data.train.dt
     count = int(min(DURATION / dt, MOST_SAMPLES))
     count = count // bench.data.horizon * bench.data.horizon or count
     time: FloatArray = np.arange(count, dtype=np.float64) * dt
+    rest = _rest(bench)
+    if not bench.study.model.inputs:
+        signal = _varied(bench)
+        at = np.arange(len(rest)) == list(bench.base.compiled.system.states).index(signal)
+        for share in RELEASES:
+            first = rest + at * share * _amplitude(bench, signal)
+            yield "release", share, np.zeros((count, 0)), first
+        return
     for share in (1.0, 0.3):
         for name, shape in shapes(time[-1], dt).items():
             inputs = _inputs(bench, shape(time), share)
             if inputs is not None:
-                yield name, share, inputs
+                yield name, share, inputs, rest
 
 
 def _inputs(bench: Bench, shape: FloatArray, share: float) -> FloatArray | None:
     """All inputs for a shape of the driven input; None if a derivative exceeds its past range."""
     recording, names = bench.data.train, list(bench.study.model.inputs)
-    driven = _varied_input(bench)
+    driven = _varied(bench)
     middle = recording.inputs.mean(axis=0)
     inputs = np.tile(middle, (len(shape), 1))
     at = names.index(driven)
@@ -154,12 +177,24 @@ def _inputs(bench: Bench, shape: FloatArray, share: float) -> FloatArray | None:
 
 
 def _rest(bench: Bench) -> FloatArray:
-    states = initial_states(bench.base.compiled.system, bench.data.train)
-    return np.where(np.arange(states.shape[1]) < 1, states.mean(axis=0), 0.0)
+    """States at rest in the middle of where the machine has been: rates are zero."""
+    rates = [bool(state.rate_of) for state in bench.base.compiled.system.states.values()]
+    return np.where(rates, 0.0, _states(bench).mean(axis=0))
 
 
 def _first_states(bench: Bench) -> FloatArray:
-    return np.asarray(initial_states(bench.base.compiled.system, bench.data.train)[0])
+    return np.asarray(_states(bench)[0])
+
+
+def _states(bench: Bench) -> FloatArray:
+    """States from the channels, hidden ones as fitted at each window's beginning, shape (n, k)."""
+    system, fitted = bench.base.compiled.system, bench.base.train.initial
+    found = initial_states(system, bench.data.train)
+    hidden = sorted(set(range(found.shape[1])) - shown_states(system))
+    if hidden and len(fitted):
+        window = np.minimum(np.arange(len(found)) // bench.base.horizon, len(fitted) - 1)
+        found[:, hidden] = fitted[window][:, hidden]
+    return found
 
 
 def _separation(

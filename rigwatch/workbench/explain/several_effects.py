@@ -6,7 +6,8 @@ of the sets of effects that explain the error best is selected, and each of its 
 against all candidates while the rest of the set is in the model. An effect is named as missing if
 it comes first there and if every equally good set contains it. If no set reduces the residual to
 noise, something else is missing as well, and the verdict on single effects stands. If that names
-none, its text says what the best set leaves, and what every equally good set has in common.
+none, its text says what the best set leaves, and what every equally good set has in common. If it
+names one, and a set without it leaves far less than any with it, the verdict is undetermined.
 """
 
 from collections.abc import Collection, Sequence
@@ -29,6 +30,7 @@ from rigwatch.workbench.explain.verdict import Verdict, judge
 from rigwatch.workbench.explain.verdict_calibration import Evidence
 from rigwatch.workbench.ranking import (
     EXPLAINED,
+    MUCH_WORSE,
     Progress,
     Ranked,
     in_order,
@@ -117,6 +119,8 @@ def _leaves_little(bench: Bench, best: Ranked) -> bool:
 
 def _with_best_set(verdict: Verdict, best: Combination, every: Sequence[Combination]) -> Verdict:
     """The verdict with what the best set leaves in its text; that of a named effect unchanged."""
+    if verdict.word == "missing_effect":
+        return _doubted(verdict, every)
     if verdict.word not in UNNAMED or len(best.rows) == 1:
         return verdict
     text = f"{verdict.text}; {_joined(best.labels)} together leave"
@@ -126,6 +130,29 @@ def _with_best_set(verdict: Verdict, best: Combination, every: Sequence[Combinat
     if common and common != best.labels:
         text += f", and each of the {len(equals)} sets that are as good contains {_joined(common)}"
     return replace(verdict, text=text)
+
+
+def _doubted(verdict: Verdict, every: Sequence[Combination]) -> Verdict:
+    """The verdict on one effect; undetermined if a set without it leaves far less than any with it.
+
+    Alone an effect may win by taking a part of what several others cause.
+    """
+    named = {*verdict.members, *verdict.rivals}
+    least = [
+        min(
+            (each for each in every if bool(each.labels & named) == contains),
+            key=lambda each: each.fitted.held_out_error,
+            default=None,
+        )
+        for contains in (True, False)
+    ]
+    own, other = least
+    if other is None or len(other.rows) == 1:
+        return verdict
+    left = min(each.fitted.held_out_error for each in (own, verdict.best) if each and each.fitted)
+    if other.fitted.held_out_error * MUCH_WORSE > left:
+        return verdict
+    return _undetermined_by_sets(verdict, other)
 
 
 def _joined(labels: Collection[str]) -> str:

@@ -97,7 +97,7 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
     """The verdict on a ranking; `floor` is the noise floor of the held-out recordings."""
     accepted = [row for row in rows if row.accepted]
     if not accepted:
-        return _nothing_found(base, floor)
+        return _nothing_found(base, rows, floor)
     best = _named(base, accepted, floor)
     assert best.fitted is not None
     trusted = floor.reached(best.fitted.held_out)
@@ -280,12 +280,16 @@ def _is_simple_enough(best: Ranked, row: Ranked) -> bool:
     return row.free <= best.free and row.placement.effect.refines not in known
 
 
-def _nothing_found(base: Fitted, floor: NoiseFloor) -> Verdict:
+def _nothing_found(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
     ratio = floor.ratio(base.held_out)
     if floor.reached(base.held_out):
         text = f"the held-out error is {ratio:.2f} times the noise floor, and no effect lowers it"
         return Verdict("nothing_missing", None, (), (), text)
     text = f"the held-out error is {ratio:.2f} times the noise floor, and no known effect lowers it"
+    fitted = [row for row in rows if row.fitted is not None]
+    if fitted:
+        nearest = min(fitted, key=lambda row: row.held_out_error)
+        text += f"; nearest is {nearest.label}, refused: {nearest.reason}"
     return Verdict("unknown_effect", None, (), (), text)
 
 
