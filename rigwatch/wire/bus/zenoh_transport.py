@@ -274,9 +274,13 @@ class ZenohTransport:
         channel, lock = subscriber.handler, threading.Lock()
 
         def take() -> None:
-            with lock, contextlib.suppress(zenoh.ZError):  # closed meanwhile
+            with lock:
                 for _ in range(WAITING):
-                    if (sample := channel.try_recv()) is None:
+                    try:
+                        sample = channel.try_recv()
+                    except zenoh.ZError:  # closed meanwhile
+                        return
+                    if sample is None:
                         return
                     receive(sample.payload.to_bytes(), _sender(sample), _mark(sample))
 
