@@ -50,7 +50,8 @@ class Chain:
             self._publisher.publish(self.acquisition.update(raw))
         link, counters = self.device.link, self._adapter.counters()
         self._publisher.publish(self.acquisition.tick(time.monotonic_ns(), link, counters))
-        self._pulse.advance(self.acquisition.samples)
+        waits = "" if link.connected and not link.text else link.text or "the device is not open"
+        self._pulse.advance(self.acquisition.samples, waits)
 
 
 def acquire(

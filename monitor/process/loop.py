@@ -127,6 +127,10 @@ class MonitorProcess:
         left = self._stale_after - self.reader.silent_for()
         return min(left, TURN) if left > 0.0 else TURN
 
+    def waits(self) -> str:
+        """Why there are no samples to come; empty if daq runs and has a device."""
+        return self._daq_trouble if self._daq_there() else "the daq process is not there"
+
     def keep_position(self) -> None:
         """Store the position; all samples read so far have been processed.
 
@@ -365,7 +369,7 @@ def watch(process: MonitorProcess, stop: threading.Event) -> None:
         if not items or time.monotonic() - looked >= TURN:
             looked = time.monotonic()
             process.look_around()
-        heartbeat.advance(process.reader.counters.delivered)
+        heartbeat.advance(process.reader.counters.delivered, process.waits())
     heartbeat.stopping()
 
 

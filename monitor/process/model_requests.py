@@ -15,6 +15,9 @@ from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.messages import LONGEST_NAME, LONGEST_TEXT, Identity, ModelChange
 from rigwatch.wire.typed_files import JsonError, json_value
 
+BEGUN_WITHIN = 2.4
+"""Time after which a change that has not begun is withdrawn [s]."""
+
 
 @dataclass(eq=False)
 class _Waiting:
@@ -22,9 +25,17 @@ class _Waiting:
 
     request: ModelRequest
     identity: Identity
-    withdrawn: bool = False
+    decided: threading.Lock = field(default_factory=threading.Lock)
     answered: threading.Event = field(default_factory=threading.Event)
-    answer: ModelReply = field(default_factory=lambda: ModelReply(False, "the monitor is busy"))
+    answer: ModelReply = field(
+        default_factory=lambda: ModelReply(
+            False, "it has begun and may still come into force: its file is written slowly"
+        )
+    )
+
+    def decide(self) -> bool:
+        """Apply or withdraw it: whoever comes first may, and only once."""
+        return self.decided.acquire(blocking=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +68,8 @@ class ModelDesk:
         found = []
         while not self._waiting.empty():
             one = self._waiting.get()
-            if one.withdrawn:
-                continue
+            if not one.decide():
+                continue  # withdrawn
             try:
                 found.append(self._apply(one.request, one.identity, place))
                 text = f"in force from sample {place.seq} of boot {place.boot} on"
@@ -86,7 +97,9 @@ class ModelDesk:
             return [msgspec.json.encode(ModelReply(False, f"refused: {verdict.refusal}"))]
         one = _Waiting(_bounded(request), verdict.identity)
         self._waiting.put(one)
-        one.withdrawn = not one.answered.wait(0.8 * PATIENCE)
+        if not one.answered.wait(BEGUN_WITHIN) and one.decide():
+            return [msgspec.json.encode(ModelReply(False, "the monitor is busy; nothing changes"))]
+        one.answered.wait(0.8 * PATIENCE - BEGUN_WITHIN)  # begun: a slow disk is waited for
         return [msgspec.json.encode(one.answer)]
 
     def _apply(self, request: ModelRequest, identity: Identity, place: Place) -> ModelChange:

@@ -97,6 +97,11 @@ class Seat:
         now = self._process.reader.counters.delivered if self._process else 0
         return self._before + now
 
+    @property
+    def waits(self) -> bool:
+        """Whether there are no samples to come: no bus yet, no daq, or no device."""
+        return self._process is None or bool(self._process.waits())
+
     def read(self) -> None:
         """Take what has come; a failure ends this rig's run and no other's."""
         if self._process is None:
@@ -225,7 +230,8 @@ def take_turns(
     while not stop.is_set():
         began = time.monotonic()
         one_turn(seats, together)
-        heartbeat.advance(sum(seat.delivered for seat in seats))
+        waits = "no rig has samples to come" if all(seat.waits for seat in seats) else ""
+        heartbeat.advance(sum(seat.delivered for seat in seats), waits)
         stop.wait(max(0.0, began + TURN - time.monotonic()))
 
 

@@ -111,7 +111,7 @@ class LiveDashboard:
         return ""
 
     def _tell_supervisor(self) -> None:
-        self._heartbeat.advance(self.facts.samples)
+        self._heartbeat.advance(self.facts.samples, "no samples arrive")
 
     def _tell_rig(self) -> None:
         """The dashboard's own health, once a second."""

@@ -136,7 +136,7 @@ def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event, pul
     pulse.ready(f"recording to {recorder.store.folder}")
     while not stop.wait(recorder.settings.flush * _OF_FLUSH):
         recorder.turn(time.monotonic(), time.time_ns())
-        pulse.advance(recorder.feed.samples)
+        pulse.advance(recorder.feed.samples, "no samples arrive")
     pulse.stopping()
     recorder.close(time.monotonic(), time.time_ns())
     return recorder.store.folder

@@ -1,7 +1,9 @@
 """An accepted model goes to a running monitor: its residual falls, nothing is lost, and back."""
 
 import json
+import os
 import threading
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -167,6 +169,31 @@ def test_a_replay_gives_the_same_to_the_last_bit(
     assert sum(isinstance(j.item, ModelChange) for j in judged) == 1
     replayed = concatenate([j.watched.estimates for j in judged if j.watched])
     assert encode(replayed) == encode(live)
+
+
+def test_a_change_that_a_slow_disk_delays_is_answered_by_what_becomes_of_it(
+    study: Study, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sync = os.fsync
+
+    def slowly(handle: int) -> None:
+        time.sleep(2.0)  # two files: longer than a change may wait for its turn
+        sync(handle)
+
+    bench.send(cut(block(3), 0, 500))
+    monkeypatch.setattr(os, "fsync", slowly)
+    reply = bench.ask(change_of(study))
+    assert reply.done, reply.text
+    assert reply.seq == 500
+    assert load_model(bench.model).promoted is not None
+
+
+def test_a_change_that_is_answered_busy_changes_nothing(study: Study, bench: Bench) -> None:
+    reply = ask_for_model(bench.observer, change_of(study))  # while the loop does not turn
+    assert not reply.done
+    assert "busy; nothing changes" in reply.text
+    bench.turn()
+    assert load_model(bench.model) == MODEL == bench.monitor.rig.model
 
 
 @pytest.mark.parametrize(

@@ -4,13 +4,13 @@
 process uses one protocol for either parent, and none if it was started by hand.
 
     READY=1                 it has started
-    WATCHDOG=1              samples advanced since the last notification: only this feeds a watchdog
+    WATCHDOG=1              samples advanced since the last notification, or there are none to come
     X_RIGWATCH_COUNT=n      its loop runs; n samples passed since it started
     STATUS=text             one line for people
     STOPPING=1              it is stopping
 
-A loop that runs without samples is alive but does not feed the watchdog: the supervisor can tell a
-process that hangs from one that waits for its source.
+A loop that runs without samples is alive but feeds the watchdog only if it says what it waits for:
+to start it again would bring no unplugged device back.
 """
 
 import contextlib
@@ -21,6 +21,8 @@ from collections.abc import Callable, Mapping
 
 INTERVAL = 0.25
 """Shortest time between two notifications [s]."""
+WAITS_AFTER = 5.0
+"""Time without samples after which a process says that it waits [s]."""
 
 
 class Heartbeat:
@@ -44,6 +46,8 @@ class Heartbeat:
         self._socket: socket.socket | None = None
         self._said_at = -INTERVAL
         self._said_count = 0
+        self._grown_at = clock()
+        self._waits = ""
         if self._address:
             self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
             self._socket.setblocking(False)
@@ -52,17 +56,23 @@ class Heartbeat:
         """Report that the process has started: its device, bus or file is open."""
         self._say(f"READY=1\nSTATUS={status}\nX_RIGWATCH_COUNT={self._said_count}")
 
-    def advance(self, count: int) -> None:
+    def advance(self, count: int, waits: str = "") -> None:
         """Report a turn of the loop; `count` samples have passed since the start.
 
-        Call it at every turn, even if `count` has not increased. It costs a clock reading.
+        Call it at every turn, even if `count` has not increased. It costs a clock reading. `waits`
+        says what it waits for, if that is no fault of this process; it counts after some seconds.
         """
         now = self._clock()
         if self._socket is None or now - self._said_at < INTERVAL:
             return
-        fed = "WATCHDOG=1\n" if count > self._said_count else ""
-        self._said_at, self._said_count = now, count
-        self._say(f"{fed}X_RIGWATCH_COUNT={count}")
+        if count > self._said_count:
+            self._grown_at = now
+        waits = waits if now - self._grown_at >= WAITS_AFTER else ""
+        words = ["WATCHDOG=1"] if count > self._said_count or waits else []
+        if waits != self._waits:
+            words.append(f"STATUS={f'waits: {waits}' if waits else 'running'}")
+        self._said_at, self._said_count, self._waits = now, count, waits
+        self._say("\n".join([*words, f"X_RIGWATCH_COUNT={count}"]))
 
     def status(self, text: str) -> None:
         """Report one line for people, such as "reconnecting to the device"."""

@@ -37,8 +37,8 @@ class Pulse(Protocol):
     def ready(self, status: str = "running") -> None:
         """The loop begins."""
 
-    def advance(self, count: int) -> None:
-        """A turn is over; `count` samples have passed since the loop began."""
+    def advance(self, count: int, waits: str = "") -> None:
+        """A turn is over; `count` samples have passed since the loop began; what it waits for."""
 
     def stopping(self) -> None:
         """The loop has ended."""
@@ -66,6 +66,7 @@ class Part:
 
     Attributes:
         settled: whether its loop has begun, or has failed to.
+        waits: what it waits for, if that is no fault of this process.
     """
 
     def __init__(
@@ -75,7 +76,7 @@ class Part:
         version: Callable[[], object] = lambda: None,
         say: Callable[[str], None] = _log.warning,
     ) -> None:
-        self.settled = False
+        self.settled, self.waits = False, ""
         self._name, self._work, self._out = name, work, say
         self._version, self._taken = version, _NOTHING
         self._stop, self._ended = threading.Event(), False
@@ -96,9 +97,9 @@ class Part:
         self.settled = True
         self._turned_at = time.monotonic()
 
-    def advance(self, count: int) -> None:
+    def advance(self, count: int, waits: str = "") -> None:
         """See `Pulse`."""
-        self._turned_at = time.monotonic()
+        self._turned_at, self.waits = time.monotonic(), waits
         if count > self._now:
             self._now, self._pause = count, FIRST_PAUSE
 
@@ -178,7 +179,8 @@ def run_side_by_side(
                 part.renew()
         for part in parts:
             part.look()
-        heartbeat.advance(sum(part.count for part in parts))
+        waits = "no rig has samples to come" if all(part.waits for part in parts) else ""
+        heartbeat.advance(sum(part.count for part in parts), waits)
     heartbeat.stopping()
     for part in parts:
         part.stop()

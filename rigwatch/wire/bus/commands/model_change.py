@@ -9,8 +9,8 @@ from rigwatch.wire.errors import BusError
 from rigwatch.wire.typed_files import JsonError, json_value
 
 KEY = "monitor/model"
-PATIENCE = 3.0
-"""Longest time in which a monitor replies [s]."""
+PATIENCE = 30.0
+"""Longest time in which a monitor replies, the writing of its files to a slow disk included [s]."""
 
 
 def ask_for_model(bus: Bus, request: ModelRequest, timeout: float = PATIENCE) -> ModelReply:
