@@ -1,5 +1,6 @@
 """Figures learnt from a short start of a nonlinear structure: false alarms stay at their rate."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,11 @@ from rigwatch.structures.damage.detector import Judge
 from rigwatch.structures.damage.examination import Settings, examine
 from rigwatch.structures.damage.innovations import Innovations
 from rigwatch.structures.damage.undamaged_reference import Reference, reference
+from rigwatch.structures.live.live_watch import LiveDamage, LiveSettings, Said
 from rigwatch.structures.model.checks import load_structure
 from rigwatch.structures.model.description import Structure, coefficients
 from rigwatch.structures.records.record import Record
+from rigwatch.wire.messages.message_types import Alarm, Column, Event, SampleBlock
 from sim_plant.structure import Damage, StructureRecord, simulate, with_noise
 
 UNDAMAGED = 1.0
@@ -99,3 +102,33 @@ def test_a_softer_spring_is_found_all_the_same(
     record = noisy(simulate(file, 0.01, 10.0, damages=[damage]), 3)
     found = examine(structure, record, Settings(undamaged=UNDAMAGED))
     assert [d.ranking.best.name for d in found.damages] == [spring]
+
+
+def test_a_structure_that_moves_at_the_first_sample_is_watched_all_the_same(
+    file: Path, structure: Structure
+) -> None:
+    # Recorded loads tell the time, which a file's sines cannot.
+    text = file.read_text().partition("sines = ")[0] + 'channel = "wind"\n'
+    pushed = file.with_name("pushed.toml")
+    pushed.write_text(text, encoding="utf-8")
+    time = np.arange(1401) * 0.01
+    wind = 40 * np.sin(9 * time) + 30 * np.sin(23 * time + 1)
+    damage = Damage(9.0, {"springs.upper.stiffness": 180.0})
+    made = simulate(pushed, 0.01, 14.0, recorded={"wind": wind}, damages=[damage])
+    columns = with_noise(made, {"x1": 0.02, "x2": 0.02}, 5, normal=True).columns
+    live = LiveDamage(load_structure(pushed), 0.01, LiveSettings())
+    said = list[Said]()
+    for first in range(300, 1400, 50):
+        numbers = np.arange(first, first + 50)
+        signals = tuple(Column(n, "", columns[n][numbers]) for n in ("x1", "x2", "wind"))
+        block = SampleBlock("frame", 1, first, numbers * 10_000, numbers * 10_000_000, signals)
+        said += live.update(block)
+    assert [m.code for m in said if isinstance(m, Event)] == ["WATCHED", "DAMAGE"]
+    assert re.search(r"lower = [\d.]+ N/m, lower_cubic = [\d.]+ N/m\^3", said_of(said)[0])
+    (alarm,) = [m for m in said if isinstance(m, Alarm)]
+    assert 900 <= alarm.seq < 930
+    assert said_of(said)[1].startswith("upper softer at")
+
+
+def said_of(said: list[Said]) -> list[str]:
+    return [message.text for message in said if isinstance(message, Event)]

@@ -98,6 +98,7 @@ def _settings(arguments: argparse.Namespace) -> "Settings":
         limit=arguments.limit,
         settle=arguments.settle,
         known=arguments.known,
+        moving=arguments.moving,
     )
 
 

@@ -49,6 +49,11 @@ def add_test(parser: argparse.ArgumentParser, within: str, settle: str) -> None:
         action="store_true",
         help="take the file's values as true, even those marked unknown",
     )
+    parser.add_argument(
+        "--moving",
+        action="store_true",
+        help="the structure moves at the first sample, instead of being as in the file",
+    )
 
 
 def add_report(parser: argparse.ArgumentParser) -> None:

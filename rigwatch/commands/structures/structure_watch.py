@@ -85,5 +85,6 @@ def _watched(arguments: argparse.Namespace, rate: float) -> "LiveDamage":
         arguments.span,
         arguments.settle,
         arguments.known,
+        arguments.moving,
     )
     return LiveDamage(load_structure(arguments.structure), 1.0 / rate, settings)

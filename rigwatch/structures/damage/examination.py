@@ -47,6 +47,7 @@ class Settings:
         settle: length of data for the first identification [s]; damages closer together
             count as one.
         known: take the file's values as true even if it marks them as unknown.
+        moving: the structure moves at the first sample, instead of being as in the file.
     """
 
     undamaged: float | None = None
@@ -54,6 +55,7 @@ class Settings:
     limit: float | None = None
     settle: float = 2.0
     known: bool = False
+    moving: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +122,9 @@ def examine(
     _check(chosen)
     undamaged = chosen.undamaged or 0.2 * len(record) * record.dt
     progress(f"undamaged structure from the first {undamaged:g} s")
-    base = reference(structure, record, undamaged, known=chosen.known, model=model)
+    base = reference(
+        structure, record, undamaged, known=chosen.known, moving=chosen.moving, model=model
+    )
     judge = Judge(base.sigma, base.samples, chosen.rate, chosen.limit)
     work = _Search(base, judge, chosen, progress)
     work.run()

@@ -59,6 +59,7 @@ def reference(
     undamaged: float,
     *,
     known: bool = False,
+    moving: bool = False,
     model: SpringModel | None = None,
 ) -> Reference:
     """The structure identified from the first `undamaged` seconds of the record.
@@ -68,6 +69,7 @@ def reference(
         record: the whole record.
         undamaged: length of the undamaged start [s].
         known: take the file's values as true instead of identifying.
+        moving: identify also where every node is and how fast at the first sample.
         model: the structure with another record, to reuse its kernel if `known` is set.
 
     Raises:
@@ -79,8 +81,9 @@ def reference(
             f"{structure.name}: found {undamaged:g} s of undamaged record, expected between"
             f" {LEAST * record.dt:g} and {len(record) * record.dt:g} s"
         )
-    names, values, covariance = _identified(structure, record, samples, known=known)
-    if known and model is not None:
+    unknowns = _unknowns(structure, known=known, moving=moving)
+    names, values, covariance = _identified(structure, record, samples, unknowns)
+    if not unknowns and model is not None:
         model = with_record(model, record)
     else:
         model = spring_model(structure, record, dict(zip(names, values.tolist(), strict=True)))
@@ -93,18 +96,28 @@ def reference(
     figures = {
         name: Figure(value, value - width, value + width)
         for name, value, width in zip(names, values.tolist(), half, strict=True)
+        if not (moving and name.endswith("(0)"))
     }
     return Reference(model, parameters, figures, _spread(model, names, covariance), sigma, samples)
 
 
+def _unknowns(structure: Structure, *, known: bool, moving: bool) -> list[str]:
+    """Names of what is identified: what the file marks, and if moving the first state."""
+    return [
+        name
+        for name, number in coefficients(structure).items()
+        if (moving and name.endswith("(0)")) or (number.unknown and not known)
+    ]
+
+
 def _identified(
-    structure: Structure, record: Record, samples: int, *, known: bool
+    structure: Structure, record: Record, samples: int, unknowns: Sequence[str]
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
     """Names, values and covariance of the unknowns."""
-    if known or not any(number.unknown for number in coefficients(structure).values()):
+    if not unknowns:
         return (), np.zeros(0), np.zeros((0, 0))
     start = Record(record.dt, {name: column[:samples] for name, column in record.columns.items()})
-    problem = problem_of(structure, start)
+    problem = problem_of(structure, start, unknowns)
     outcome = solver("shooting")(problem)
     covariance, turns = outcome.covariance, outcome.iterations
     if covariance is None or not (outcome.converged or _settled(turns, covariance)):

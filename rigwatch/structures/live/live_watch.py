@@ -51,6 +51,8 @@ class LiveSettings:
         span: period that `rate` refers to [s].
         settle: length of data after an alarm used to find its place [s].
         known: take the file's values as true even if it marks them as unknown.
+        moving: the structure moves at the first sample, instead of being as in the file; always
+            so if the device's first samples were missed.
     """
 
     undamaged: float = 2.0
@@ -58,6 +60,7 @@ class LiveSettings:
     span: float = 60.0
     settle: float = 2.0
     known: bool = False
+    moving: bool = False
 
 
 class LiveDamage:
@@ -109,6 +112,7 @@ class LiveDamage:
     def _begin(self, block: SampleBlock) -> None:
         self._boot, self._first, self._device = block.boot, block.seq, block.device
         self._record = GrowingRecord(self._dt, self._structure.signals, self._loads)
+        self._moving = self._settings.moving or block.seq > 0
         self._stage: Literal["learning", "watching", "gathering", "told"] = "learning"
         self._done = 0
 
@@ -129,7 +133,13 @@ class LiveDamage:
         """The undamaged structure, and the judgement of the same samples."""
         settings, head = self._settings, self._record.record(row + 1)
         try:
-            base = reference(self._structure, head, self._learnt * self._dt, known=settings.known)
+            base = reference(
+                self._structure,
+                head,
+                self._learnt * self._dt,
+                known=settings.known,
+                moving=self._moving,
+            )
         except ModelError as error:
             self._stage = "told"
             return [self._event(row, "error", "NOT WATCHED", str(error))]
@@ -154,7 +164,11 @@ class LiveDamage:
         """What the record up to a row shows, as text."""
         chosen, head = self._settings, self._record.record(row + 1)
         settings = Settings(
-            self._learnt * self._dt, chosen.rate, settle=chosen.settle, known=chosen.known
+            self._learnt * self._dt,
+            chosen.rate,
+            settle=chosen.settle,
+            known=chosen.known,
+            moving=self._moving,
         )
         try:
             return verdict(examine(self._structure, head, settings))
@@ -237,5 +251,10 @@ def _check(settings: LiveSettings) -> None:
 
 
 def _learnt(base: Reference) -> str:
-    found = ", ".join(f"{name} = {figure.value:.6g}" for name, figure in base.figures.items())
+    parameters = base.model.problem.sweeper.compiled.system.parameters
+    units = {name: parameters[name].unit for name in base.figures if name in parameters}
+    found = ", ".join(
+        f"{name} = {figure.value:.6g} {units.get(name, '')}".rstrip()
+        for name, figure in base.figures.items()
+    )
     return f"undamaged structure learnt from {base.samples} samples" + (found and f": {found}")

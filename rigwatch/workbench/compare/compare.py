@@ -90,10 +90,23 @@ def comparison(bench: Bench) -> Comparison:
         channels,
         as_written(found, base.compiled.system),
         [f"{a.effect}@{a.port}" for a in bench.study.file.effects],
-        [*bench.data.remarks, *weak],
+        [*bench.data.remarks, *weak, *_unchanging(bench)],
         dict(bench.study.holds),
         base.convergence or (bench.study.kept.convergence if bench.study.kept else None),
     )
+
+
+def _unchanging(bench: Bench) -> list[str]:
+    """Remarks on inputs that never change in the recordings of one kind."""
+    found, data = [], bench.data
+    for use, recording in (("training", data.train), ("held out", data.held_out)):
+        still = np.ptp(recording.inputs, axis=0) == 0
+        names = [name for name, at in zip(bench.study.model.inputs, still, strict=True) if at]
+        if names:
+            found.append(
+                f"{use}: {', '.join(names)} never changes; what it does there is a constant"
+            )
+    return found
 
 
 def _free(bench: Bench) -> list[float | None]:

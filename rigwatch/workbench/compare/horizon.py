@@ -33,8 +33,10 @@ PERIODS = 2.0
 """Smallest number of periods in a horizon if the slowest motion oscillates."""
 MOST_PERIODS = 12.0
 """The same at most."""
-WINDOWS = 10
-"""Minimum number of windows in the shortest recording."""
+WINDOWS, FEWEST_WINDOWS = 10, 4
+"""Minimum number of windows in the shortest recording, and if they would not span two periods."""
+LIMITED = ", limited to a tenth of the shortest recording"
+TWO_PERIODS = ", limited to two periods as the shortest recording holds few"
 FEWEST = 20
 """Minimum number of samples in a window."""
 UNCORRELATED = float(np.exp(-1))
@@ -72,10 +74,12 @@ def with_horizon(study: Study) -> Study:
     slowest = _slowest(eigenvalues(fitted, data.train), shortest)
     if slowest is None:
         return study
-    constant, name = slowest
-    chosen = float(np.clip(constant, least, max(longest, least)))
-    bound = ", limited to a tenth of the shortest recording" if chosen < constant else ""
-    chosen, shortened = _within_windows(chosen, data)
+    constant, name, swings = slowest
+    # Within less than two periods an initial state stands in for what is missing.
+    needed = min(swings, shortest / FEWEST_WINDOWS)
+    chosen = float(np.clip(constant, least, max(longest, least, needed)))
+    bound = "" if chosen >= constant else LIMITED if chosen <= longest else TWO_PERIODS
+    chosen, shortened = _within_windows(chosen, data, needed)
     return _with_source(study, f"{name}{bound}{shortened}", chosen)
 
 
@@ -87,14 +91,18 @@ def with_horizon_of(study: Study, other: Study) -> Study:
     return replace(study, file=file, horizon_from=other.horizon_from)
 
 
-def _within_windows(horizon: float, data: Data) -> tuple[float, str]:
-    """The horizon [s], shortened if inputs change only at the ends of its windows; words on it."""
+def _within_windows(horizon: float, data: Data, needed: float = 0.0) -> tuple[float, str]:
+    """The horizon [s], shortened if inputs change only at the ends of its windows; words on it.
+
+    It does not become shorter than `needed` [s].
+    """
+    shares = [share for share in SHORTER if share == 1 or share * horizon >= needed]
 
     def at_ends(share: float) -> float:
         return max(_share_at_ends(r, share * horizon) for r in (data.train, data.held_out))
 
-    found = next((share for share in SHORTER if at_ends(share) <= MOST_AT_ENDS), None)
-    share = found or min(SHORTER, key=at_ends)
+    found = next((share for share in shares if at_ends(share) <= MOST_AT_ENDS), None)
+    share = found or min(shares, key=at_ends)
     return share * horizon, SHORTENED if share < 1 else ""
 
 
@@ -124,9 +132,10 @@ def _fitted_once(study: Study) -> tuple[Fitted, Data]:
     return fit_base(with_hold(study, data, scale), data, scale), data
 
 
-def _slowest(found: ComplexArray, longest: float) -> tuple[float, str] | None:
-    """Horizon for the slowest mode [s], and its description; None without a mode.
+def _slowest(found: ComplexArray, longest: float) -> tuple[float, str, float] | None:
+    """Horizon for the slowest mode [s], its description, and two of its periods [s], 0 if none.
 
+    None without a mode.
     Modes slower than the recording, for example integrators, are ignored.
     """
     rate = np.sort_complex(found.ravel())
@@ -139,8 +148,9 @@ def _slowest(found: ComplexArray, longest: float) -> tuple[float, str] | None:
     at = resolved[np.argmin(np.abs(horizons - slowest))]
     if _oscillates(at):
         period, decay = 2 * np.pi / abs(at), 1 / abs(at.real)
-        return slowest, f"the model's period of {period:.2g} s that decays in {decay:.2g} s"
-    return slowest, f"the model's time constant of {slowest / SPANS:.2g} s"
+        words = f"the model's period of {period:.2g} s that decays in {decay:.2g} s"
+        return slowest, words, PERIODS * float(period)
+    return slowest, f"the model's time constant of {slowest / SPANS:.2g} s", 0.0
 
 
 def _oscillates(rate: ComplexArray) -> BoolArray:

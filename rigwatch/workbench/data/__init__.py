@@ -17,6 +17,7 @@ from rigwatch.workbench.data.proposals import (
     Part,
     proposed_low_pass,
     proposed_split,
+    unchanging,
 )
 from rigwatch.workbench.data.recorded_columns import read_columns
 from rigwatch.workbench.data.repeats import repeat_along_motion, repeat_of
@@ -47,6 +48,7 @@ __all__ = [
     "read_columns",
     "repeat_along_motion",
     "repeat_of",
+    "unchanging",
     "with_elements",
     "with_next_rows",
 ]

@@ -20,6 +20,8 @@ KEPT = 20
 """Samples at rest kept before the motion, as they show the initial state."""
 TRAIN_SHARE = 0.6
 """Share of a single recording used for training; the rest is held out."""
+LEAST_CHANGE = 0.05
+"""Least share of the changes of what drives a model on either side of a split."""
 ONE_IN = 4
 """Of so many recordings one is held out, and at least one."""
 GOLDEN = 0.5 * (5**0.5 - 1)
@@ -77,8 +79,44 @@ def proposed_split(
         decide = _deciding(tables, names)
         return [p for p in parts if p.recording not in decide], [parts[at] for at in decide]
     whole, last = parts[0], len(tables[0]) * tables[0].dt
-    cut = round(whole.start + TRAIN_SHARE * (min(whole.end, last) - whole.start), 3)
+    cut = round(_cut(tables[0], names, whole.start, min(whole.end, last)), 3)
     return [Part(0, whole.start, cut)], [Part(0, cut, whole.end)]
+
+
+def _cut(table: Columns, names: Sequence[str], start: float, end: float) -> float:
+    """Where to cut one recording [s], so that what drives it changes on both sides.
+
+    If one side of the usual place holds hardly a change, it lies in the middle between two changes,
+    about as many before it as usual.
+    """
+    usual = start + TRAIN_SHARE * (end - start)
+    changes = _changes(table, names)
+    first, last = round(start / table.dt), round(end / table.dt)
+    total = max(float(changes[first:last].sum()), 1e-300)
+    before = np.cumsum(changes[first:last]) / total
+    enough = (before >= LEAST_CHANGE) & (before <= 1 - LEAST_CHANGE)
+    both = np.flatnonzero(enough)
+    if not len(both) or enough[min(round((usual - start) / table.dt), len(before) - 1)]:
+        return usual
+    distance = np.abs(before[both] - TRAIN_SHARE)
+    nearest = both[distance <= distance.min() + LEAST_CHANGE]
+    return start + float(np.median(nearest)) * table.dt
+
+
+def unchanging(table: Columns, names: Sequence[str], part: Part) -> list[str]:
+    """Channels that drive the model and never change within a part."""
+    last = len(table) if part.end == float("inf") else round(part.end / table.dt)
+    own = slice(round(part.start / table.dt), last)
+    return [name for name in names if np.ptp(bridged(table.values[name])[own]) == 0]
+
+
+def _changes(table: Columns, names: Sequence[str]) -> FloatArray:
+    """Squared changes of channels from sample to sample, each over its range, shape (samples,)."""
+    found = np.zeros(len(table))
+    for name in names:
+        signal = bridged(table.values[name])
+        found[1:] += np.square(np.diff(signal) / max(float(np.ptp(signal)), 1e-300))
+    return found
 
 
 def _deciding(tables: Sequence[Columns], names: Sequence[str]) -> list[int]:
@@ -100,7 +138,12 @@ def _deciding(tables: Sequence[Columns], names: Sequence[str]) -> list[int]:
 
 
 def _excess(tables: Sequence[Columns], names: Sequence[str], index: int) -> float:
-    """How far one recording's excitation exceeds the others', relative to their range."""
+    """How far one recording's excitation exceeds the others', relative to their range.
+
+    Infinite if nothing changes in it: it decides nothing.
+    """
+    if names and len(unchanging(tables[index], names, Part(index))) == len(names):
+        return float("inf")
     worst = 0.0
     for name in names:
         own = bridged(tables[index].values[name])

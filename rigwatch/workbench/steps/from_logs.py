@@ -18,6 +18,7 @@ from rigwatch.workbench.data import (
     proposed_low_pass,
     proposed_split,
     read_columns,
+    unchanging,
 )
 from rigwatch.workbench.steps.imported_logs import Logs, check_different, check_names, imported
 from rigwatch.workbench.steps.log_columns import Matched
@@ -92,7 +93,9 @@ def _file(files: NewFiles, logs: Logs, model: Model, reading: Matched) -> tuple[
     for use, parts in (("train", train), ("held_out", held_out)):
         for part in parts:
             lines += _span(use, logs.data[part.recording].stem, part, logs)
-            choices.append(f"{use.replace('_', ' ')}: {_in_words(logs, part)}")
+            still = unchanging(tables[part.recording], driving, part)
+            never = f"; {', '.join(still)} never changes there" if still else ""
+            choices.append(f"{use.replace('_', ' ')}: {_in_words(logs, part)}{never}")
     for path in logs.healthy:
         lines += _span("healthy", path.stem, Part(0), logs)
     given = {*logs.start, *(name for values in logs.known.values() for name in values)}

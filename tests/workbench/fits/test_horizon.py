@@ -101,6 +101,15 @@ def test_an_oscillation_is_followed_until_it_has_decayed(
     assert "that decays in" in chosen.horizon_from
 
 
+def test_two_periods_are_spanned_though_the_recording_holds_few(tmp_path: Path) -> None:
+    # Seventeen periods of 0.21 s: a tenth of them would be 1.7.
+    tables = [ringing(seed, 0.6, 356) for seed in (0, 1)]
+    study = studied(tmp_path, LIGHT, tables[:1], tables[1:], {"u": "m/s^2", "x": "m"})
+    chosen = with_horizon(study)
+    assert chosen.file.horizon == pytest.approx(2 * 2 * np.pi / 30, rel=0.06)
+    assert "limited to two periods" in chosen.horizon_from
+
+
 @pytest.mark.parametrize("samples", [1563, 2868])
 def test_recordings_that_fill_no_number_of_horizons_do_not_end_it(
     tmp_path: Path, samples: int

@@ -19,6 +19,7 @@ from rigwatch.workbench.steps.change import add
 from rigwatch.workbench.steps.ledger_replay import replay
 from rigwatch.workbench.study.creation import create
 from rigwatch.workbench.study.study import Study, open_study
+from tests.workbench.machine import studied
 
 RATE = 200.0
 SI = {
@@ -200,3 +201,28 @@ def test_turns_and_angles_are_not_taken_for_each_other() -> None:
         check_unit("g", Input(unit="m/s^2"), "channel 'a'", "tower: a")
     with pytest.raises(ModelError, match="unknown unit 'volts'"):
         check_unit("volts", Input(unit="V"), "channel 'u'", "tower: u")
+
+
+COOLING = """
+name = "cup"
+summary = "A cup that cools; its temperature is read in degrees Celsius."
+inputs.q = { unit = "K/s" }
+states.a = { unit = "degC", derivative = "q - g*a + load", measured = "a" }
+parameters.g = { value = 0.3, unit = "1/s" }
+outputs.a = { unit = "degC", expression = "a" }
+[ports.load]
+kind = "force"
+unit = "K/s"
+variables.x = { expression = "a", unit = "degC" }
+[ports.a_sensor]
+kind = "sensor"
+signal = "a"
+"""
+
+
+def test_the_offset_of_a_sensor_in_degrees_celsius_is_a_difference(tmp_path: Path) -> None:
+    generator = np.random.default_rng(0)
+    table = {"q": generator.normal(size=600), "a": 20 + generator.normal(size=600)}
+    study = studied(tmp_path, COOLING, [table], [table], {"q": "K/s", "a": "degC"})
+    own = study.effect_at("offset", "a_sensor").parameters["u0"]
+    assert (own.neutral, own.value, own.unit, own.shown or own.unit) == (0.0, 0.0, "K", "K")

@@ -22,7 +22,7 @@ from rigwatch.physics.engine.equations.expression import parse as parse_expressi
 from rigwatch.physics.engine.equations.in_si import into_si
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.typed_files import Section
-from rigwatch.wire.units import UnitError
+from rigwatch.wire.units import UnitError, unit_of
 
 Text = Annotated[str, Meta(min_length=1)]
 
@@ -162,13 +162,22 @@ def _filled(item: Numbers, units: Mapping[str, str], where: str) -> Numbers:
     if "{" not in item.unit:
         return item
     try:
-        return replace(item, unit=resolved(item.unit, units), shown=resolved(item.shown, units))
+        unit, shown = resolved(item.unit, units), resolved(item.shown, units)
+        if isinstance(item, EffectParameter) and (item.role == "strength" or item.scale):
+            unit, shown = _as_difference(unit), _as_difference(shown)
+        return replace(item, unit=unit, shown=shown)
     except KeyError as missing:
         raise ModelError(
             f"{where}: found {missing} in its units, which this port does not have"
         ) from None
     except UnitError as error:
         raise ModelError(f"{where}: {error}") from None
+
+
+def _as_difference(unit: str) -> str:
+    """The unit of differences: an offset of 0.5 degC is one of 0.5 K, not of 273.65 K."""
+    known = unit_of(unit) if unit else None
+    return known.si if known is not None and known.offset else unit
 
 
 def resolved(unit: str, units: Mapping[str, str]) -> str:

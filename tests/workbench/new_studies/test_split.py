@@ -1,0 +1,51 @@
+"""The split that is proposed excites both sides, and says of an input that it never changes."""
+
+from pathlib import Path
+
+import numpy as np
+
+from rigwatch.workbench.compare.compare import compare
+from rigwatch.workbench.data import proposed_split, unchanging
+from rigwatch.workbench.data.columns import Columns
+from rigwatch.workbench.data.proposals import Part
+from tests.workbench.machine import studied
+from tests.workbench.studies.test_own_model import PORT, SPEED, UNITS, run
+
+WIND = 'inputs.w = { unit = "rad/s^2" }\n'
+
+
+def logged(u: np.ndarray) -> Columns:
+    return Columns(0.01, {"u": u})
+
+
+def test_a_log_is_cut_where_its_input_changes_on_both_sides() -> None:
+    u = np.zeros(10_000)
+    u[500:], u[2000:], u[9900:] = 1.0, 3.0, 2.99
+    (train,), (held_out,) = proposed_split([logged(u)], ["u"])
+    assert train.end == held_out.start
+    assert 5.0 < train.end < 20.0
+
+
+def test_a_log_that_changes_all_the_time_is_cut_as_ever() -> None:
+    u = np.sin(np.arange(10_000) / 100)
+    (train,), _ = proposed_split([logged(u)], ["u"])
+    assert abs(train.end - 60.0) < 1.0
+
+
+def test_a_log_in_which_nothing_changes_is_not_held_out() -> None:
+    wave = np.sin(np.arange(3000) / 100)
+    tables = [logged(wave), logged(np.full(3000, 0.5)), logged(0.9 * wave)]
+    _, (held_out,) = proposed_split(tables, ["u"])
+    assert held_out.recording == 2
+    assert unchanging(tables[1], ["u"], Part(1)) == ["u"]
+    assert not unchanging(tables[0], ["u"], Part(0))
+
+
+def test_an_input_that_never_changes_is_told(tmp_path: Path) -> None:
+    train, still = ({**run(seed), "w": np.full(1500, 0.5)} for seed in (0, 1))
+    train["w"][700:] = 1.0
+    model = SPEED.replace("load", "w + load")
+    model = model.replace("states.v", WIND + "states.v", 1) + PORT
+    study = studied(tmp_path, model, [train], [still], {**UNITS, "w": "rad/s^2"})
+    told = [remark for remark in compare(study).remarks if "never changes" in remark]
+    assert told == ["held out: w never changes; what it does there is a constant"]
