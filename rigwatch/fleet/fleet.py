@@ -15,6 +15,8 @@ from rigwatch.wire.several_rigs import load_rigs
 
 MOST_AT_ONCE = 64
 """Rigs that are asked at the same time."""
+SILENT_S = 2.5
+"""Time without a message of health, which comes every second, after which a process hangs [s]."""
 _PROCESSES = ("monitor", "recorder", "witness")
 
 
@@ -32,6 +34,8 @@ class Onlooker:
         self._bus: Bus | None = None
         self._healths: Subscription | None = None
         self._last: dict[str, Health] = {}
+        self._heard_at: dict[str, float] = {}
+        self._hung: set[str] = set()
 
     def look(self) -> RigState:
         """The present state."""
@@ -43,13 +47,23 @@ class Onlooker:
         if not bus.connected():
             return unreachable(rig, path, f"the router at {self._config.bus.router} is away")
         there = set(bus.tokens(f"{ALIVE_KEY}/*", self._timeout))
-        missing = [name for name in self._expected() if f"{ALIVE_KEY}/{name}" not in there]
-        self._hear(wait="monitor" not in missing)
+        expected = self._expected()
+        present = {name for name in expected if f"{ALIVE_KEY}/{name}" in there}
+        self._hear(present)
+        # The router takes a silent process for gone after a while; one that ends is gone at once.
+        self._hung = self._silent(present) | (self._hung - present)
         alarms = []
-        if "monitor" not in missing:
+        if "monitor" in present - self._hung:
             with contextlib.suppress(BusError):  # it went away in between: missing the next time
                 alarms = ask_alarm_list(bus, self._timeout)
-        return judged(rig, path, missing, alarms, self._last)
+        missing = [name for name in expected if name not in present | self._hung]
+        hung = [name for name in expected if name in self._hung]
+        return judged(rig, path, missing, alarms, self._last, hung=hung)
+
+    def _silent(self, present: set[str]) -> set[str]:
+        """Processes that hold their place on the bus and have said nothing for too long."""
+        now = time.monotonic()
+        return {name for name in present if now - self._heard_at[name] > SILENT_S}
 
     def _joined(self) -> Bus:
         if self._bus is None:
@@ -61,18 +75,22 @@ class Onlooker:
         """Processes that the configuration has."""
         return ["daq", *(name for name in _PROCESSES if getattr(self._config, name) is not None)]
 
-    def _hear(self, *, wait: bool) -> None:
-        """Take the messages of health; the first time wait for one of the monitor."""
+    def _hear(self, present: set[str]) -> None:
+        """Take the messages of health; wait for one of each process not heard yet."""
         assert self._healths is not None
-        until = time.monotonic() + self._timeout
+        now = time.monotonic()
+        until = now + self._timeout
+        for name in present:
+            self._heard_at.setdefault(name, now)
         for health in self._healths.drain():
             self._take(health)
-        while wait and "monitor" not in self._last and (left := until - time.monotonic()) > 0:
+        while present - set(self._last) and (left := until - time.monotonic()) > 0:
             if (health := self._healths.get(timeout=left)) is not None:
                 self._take(health)
 
     def _take(self, health: Health) -> None:
-        self._last[health.source.partition("/")[0]] = health
+        name = health.source.partition("/")[0]
+        self._last[name], self._heard_at[name] = health, time.monotonic()
 
     def close(self) -> None:
         """Leave the rig's bus."""

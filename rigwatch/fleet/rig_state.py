@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from rigwatch.wire.messages import Alarm, Health
 
 UNREACHABLE, GONE = 100, 90
-"""Ranks of a rig whose router does not answer, and of one that lacks a process."""
+"""Ranks of a rig whose router does not answer, and of one that lacks a process or has one hang."""
 ERROR = 60
 """Rank from which on a rig needs somebody now."""
 _SEVERITY = {"critical": 80, "error": ERROR, "warning": 40, "info": 20}
@@ -26,6 +26,7 @@ class RigState:
         rank: how bad it is, 0 for a rig that runs without an alarm.
         state: why, in words.
         missing: processes that its configuration has and that are not there.
+        hung: processes that are there and give no sign of life.
         alarms: its standing alarms, the worst first.
         figures: of its monitor: `samples`, `lost_samples`, `latency_p99_ms`, …
     """
@@ -35,6 +36,7 @@ class RigState:
     rank: int
     state: str
     missing: tuple[str, ...] = ()
+    hung: tuple[str, ...] = ()
     alarms: tuple[Alarm, ...] = ()
     figures: dict[str, float] = field(default_factory=dict)
 
@@ -55,6 +57,8 @@ def judged(
     missing: Sequence[str],
     alarms: Sequence[Alarm],
     healths: Mapping[str, Health],
+    *,
+    hung: Sequence[str] = (),
 ) -> RigState:
     """The state of a rig that can be reached.
 
@@ -64,19 +68,22 @@ def judged(
         missing: processes that are not there.
         alarms: standing ones.
         healths: the last message of each process.
+        hung: processes that are there and silent.
     """
     worst = tuple(sorted(alarms, key=lambda alarm: (-rank_of(alarm), alarm.t_ns)))
     troubled = [one for one in healths.values() if one.state not in WELL]
     monitor = healths.get("monitor")
     rank, state = 0, "runs"
-    if missing:
-        rank, state = GONE, f"{', '.join(missing)} not there"
+    if missing or hung:
+        lacks = [f"{', '.join(missing)} not there"] if missing else []
+        lacks += [f"{', '.join(hung)} hangs: no sign of life"] if hung else []
+        rank, state = GONE, "; ".join(lacks)
     elif worst:
         rank, state = rank_of(worst[0]), worst[0].name
     elif troubled:
         rank, state = _TROUBLED, f"{troubled[0].source}: {troubled[0].state}"
     figures = dict(monitor.counters) if monitor else {}
-    return RigState(rig, config, rank, state, tuple(missing), worst, figures)
+    return RigState(rig, config, rank, state, tuple(missing), tuple(hung), worst, figures)
 
 
 def rank_of(alarm: Alarm) -> int:

@@ -16,8 +16,12 @@ from rigwatch.browser.server.places import PlaceError, Places
 from rigwatch.browser.server.serving import Options, serve
 from rigwatch.wire.errors import RigwatchError
 from tests.browser.page import Page, Served, looking, serving
+from tests.waiting import eventually
 
 pytestmark = pytest.mark.xdist_group("browser")
+
+
+LOG = b"t[s],x[m]\n" + b"".join(b"%.3f,1.0\n" % (0.01 * row) for row in range(100))
 
 
 def ask(
@@ -150,6 +154,30 @@ def test_a_file_that_is_too_long_is_refused_and_leaves_nothing(served: Served) -
     assert ask(served, "/")[0] == 200
     left = [path for path in served.folder.rglob("*") if path not in before and path.is_file()]
     assert left == []
+
+
+def uploads_in(folder: Path) -> list[str]:
+    return sorted(path.name for path in (folder / ".uploads").rglob("*") if path.suffix)
+
+
+def bring(served: Served, name: str) -> None:
+    assert ask(served, f"/api/upload/{name}", "PUT", body=LOG)[0] == 200
+
+
+def test_uploads_of_a_killed_server_go_with_the_next_start(tmp_path: Path) -> None:
+    with serving(tmp_path) as first:
+        bring(first, "a.csv")
+        with serving(tmp_path) as beside:
+            bring(beside, "b.csv")
+            assert uploads_in(tmp_path) == ["a.csv", "b.csv"], "the first server still runs"
+        first.process.kill()
+        first.process.wait()
+    assert uploads_in(tmp_path) == ["a.csv", "b.csv"]
+    with serving(tmp_path) as again:
+        eventually(lambda: uploads_in(tmp_path) == [], "what was left is removed")
+        for number in range(12):
+            bring(again, f"{number:02d}.csv")
+        assert uploads_in(tmp_path) == [f"{number:02d}.csv" for number in range(4, 12)]
 
 
 def test_a_long_request_is_bounded(served: Served) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 
 from rigwatch.wire.bus.connection import connect
 from rigwatch.wire.delivery.ring import SampleRing
-from rigwatch.wire.messages.message_types import Column, SampleBlock
-from rigwatch.wire.messages.topics import SAMPLES
+from rigwatch.wire.messages.message_types import Column, Health, SampleBlock
+from rigwatch.wire.messages.topics import HEALTH, SAMPLES
 from rigwatch.wire.rig_config import load_rig
 from tests.bus.samples import block
 
@@ -47,6 +47,8 @@ def main() -> None:
     sent = 0
     while True:
         due = int((time.monotonic() - start) * arguments.rate) + 1
+        if sent == 0 or sent // 256 < due // 256:
+            bus.publish(HEALTH, Health("daq/rig", time.time_ns(), "running", "", {}))
         for seq in range(sent, due):
             make = wave if arguments.wave else block
             part = make(seq, 1, arguments.boot, start_ns)

@@ -8,10 +8,11 @@ import pytest
 from rigwatch.commands import main
 from rigwatch.fleet import Fleet, as_lines, as_page
 from rigwatch.fleet.rig_state import GONE, UNREACHABLE, judged
+from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.messages import Alarm, Health
 from rigwatch.wire.rig_config import load_rig
-from tests.bus.rig import TestRig, kill
+from tests.bus.rig import TestRig, kill, stopped
 from tests.monitor_process.test_several import rig_file
 from tests.waiting import PATIENCE, eventually
 
@@ -83,10 +84,27 @@ def test_the_fleet_is_seen_and_a_rig_that_goes_moves_up(rigs, tmp_path, capsys):
     assert main(words) == 1
     assert [one["rig"] for one in json.loads(capsys.readouterr().out)] == ["stands", "runs"]
     assert "rig-runs" in page.read_text()
+    one = Fleet(paths[:1], timeout=5.0)
+    assert one.look()[0].rank < GONE
+    with stopped(monitor):
+        eventually(lambda: one.look()[0].hung == ("monitor",), "the rig's monitor hangs")
+        (state,) = Fleet(paths[:1], timeout=5.0).look()
+        assert (state.hung, state.missing) == (("monitor",), ())
+        assert state.state == "monitor hangs: no sign of life"
+        bus = base_bus(paths[0])
+        eventually(lambda: "alive/monitor" not in bus.tokens("alive/*"), "the router's patience")
+        assert one.look()[0].hung == ("monitor",)
+        bus.close()
+    eventually(lambda: not one.look()[0].hung, "the monitor goes on")
     kill(monitor)
-    one = Fleet(paths[:1], timeout=PATIENCE)
     eventually(lambda: one.look()[0].missing == ("monitor",), "the rig lacks its monitor")
+    assert one.look()[0].hung == ()
     one.close()
+
+
+def base_bus(path: Path) -> Bus:
+    """A place on the bus of a rig."""
+    return connect(load_rig(path), "onlooker", PATIENCE)
 
 
 def test_one_rig_named_twice_is_refused(tmp_path):

@@ -15,6 +15,7 @@ from starlette.responses import Response
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
+from rigwatch.browser.recordings.uploads import kept_uploads
 from rigwatch.browser.server import (
     editor_routes,
     import_routes,
@@ -26,6 +27,7 @@ from rigwatch.browser.server import (
 )
 from rigwatch.browser.server.access import Access, Guard
 from rigwatch.browser.server.context import Context
+from rigwatch.browser.server.places import UPLOADS
 from rigwatch.browser.views import stamp
 from rigwatch.browser.work import warm_up
 from rigwatch.page import STYLE
@@ -72,7 +74,8 @@ async def _lifespan(app: Starlette) -> AsyncIterator[None]:
         rig_routes.link_of(app)
     watching = asyncio.create_task(context.desks.watch(stamp))
     try:
-        yield
+        with kept_uploads(context.places.inside(UPLOADS)):
+            yield
     finally:
         watching.cancel()
         context.desks.close()

@@ -1,7 +1,6 @@
 """Routes for uploading, inspecting and importing recordings, and for new studies and stories."""
 
 import contextlib
-import secrets
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from rigwatch.browser.recordings import (
     template_data,
     template_names,
 )
+from rigwatch.browser.recordings.uploads import new_upload
 from rigwatch.browser.server.context import (
     Context,
     answer,
@@ -63,8 +63,7 @@ async def bring(request: Request) -> Response:
     length = request.headers.get("content-length", "")
     if length.isdigit() and int(length) > most:
         return refused(f"found {int(length) >> 20} MB, expected at most {most >> 20} MB", 413)
-    folder = context.places.inside(UPLOADS) / secrets.token_hex(6)
-    folder.mkdir(parents=True)
+    folder = new_upload(context.places.inside(UPLOADS))
     path = folder / name
     if not await _written(request, path, most):
         return refused(f"found more than {most >> 20} MB, expected less", 413)

@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 
 from rigwatch.commands.archive.archive_text import table
 from rigwatch.commands.common import print_json, say, unix_time
+from rigwatch.commands.common.numbers import POSITIVE, whole
 
 HELP = "ask an archive: a named question, or one SELECT on sessions, alarms, losses and seconds"
 EXAMPLE = """\
@@ -21,9 +22,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rig", default="%", help="name of a rig, or a pattern with %%")
     parser.add_argument("--since", metavar="TIME", help="start of the span (ISO, UTC)")
     parser.add_argument("--until", metavar="TIME", help="end of the span (exclusive)")
-    parser.add_argument("--rows", type=int, default=1000, metavar="N", help="most rows (1000)")
+    parser.add_argument("--rows", type=whole(1), default=1000, metavar="N", help="most rows (1000)")
     parser.add_argument(
-        "--seconds", type=float, default=60.0, metavar="S", help="longest time (60)"
+        "--seconds", type=POSITIVE, default=60.0, metavar="S", help="longest time (60)"
     )
 
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from rigwatch.commands.archive.archive_text import table
 from rigwatch.commands.common import print_json, say
+from rigwatch.commands.common.numbers import number
 from rigwatch.wire.errors import ArchiveError
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("url", metavar="URL", help="folder, or address such as s3://bucket/rigs")
     for name, help_ in _LIMITS.items():
         option = f"--{name.replace('_', '-')}"
-        parser.add_argument(option, type=float, default=0.0, metavar="N", help=help_)
+        parser.add_argument(option, type=number(0), default=0.0, metavar="N", help=help_)
     parser.add_argument("--rig", help="only sessions of this rig")
     parser.add_argument("--remove", action="store_true", help="remove them; else they are shown")
     parser.add_argument(

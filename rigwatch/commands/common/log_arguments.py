@@ -2,6 +2,8 @@
 
 import argparse
 
+from rigwatch.commands.common.numbers import POSITIVE
+
 
 def add_log_columns(parser: argparse.ArgumentParser) -> None:
     """How columns of a log become channels: `map`, `time`, `rate` and `columns`."""
@@ -16,7 +18,7 @@ def add_log_columns(parser: argparse.ArgumentParser) -> None:
         ),
     )
     parser.add_argument("--time", metavar="COLUMN[UNIT]", help="time column")
-    parser.add_argument("--rate", type=float, metavar="HZ", help="sample rate, without a time")
+    parser.add_argument("--rate", type=POSITIVE, metavar="HZ", help="sample rate, without a time")
     parser.add_argument(
         "--columns", metavar="A,B,…", help="column names, if there is no header line"
     )

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigwatch.commands.common import print_json, say
+from rigwatch.commands.common.numbers import POSITIVE, whole
 from rigwatch.commands.processes.model_place import check_place, install_model
 
 if TYPE_CHECKING:
@@ -60,11 +61,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="commission although position and acceleration do not show one motion",
     )
     parser.add_argument(
-        "--band", type=float, nargs=2, default=(1.0, 14.0), metavar=("LOW", "HIGH"),
+        "--band", type=POSITIVE, nargs=2, default=(1.0, 14.0), metavar=("LOW", "HIGH"),
         help="frequency range of the transfer function's fit [Hz]",
     )  # fmt: skip
-    parser.add_argument("--window", type=int, help="window of the estimates [samples]")
-    parser.add_argument("--hop", type=int, default=1, help="samples between estimates")
+    parser.add_argument("--window", type=whole(1), help="window of the estimates [samples]")
+    parser.add_argument("--hop", type=whole(1), default=1, help="samples between estimates")
 
 
 def run(arguments: argparse.Namespace) -> int:

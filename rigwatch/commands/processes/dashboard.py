@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rigwatch.commands.common.numbers import PORT
 from rigwatch.wire.errors import ConfigError, RigwatchError
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     help_ = "port of the page of the viewer `web`, whose data then take a free one; default: "
     parser.add_argument(
-        "--port", type=int, metavar="PORT", help=help_ + "dashboard.web_port and grpc_port"
+        "--port", type=PORT, metavar="PORT", help=help_ + "dashboard.web_port and grpc_port"
     )
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigwatch.commands.common import check_folder, print_json, tell_address
+from rigwatch.commands.common.numbers import PORT, number
 
 if TYPE_CHECKING:
     from rigwatch.fleet import Fleet, RigState
@@ -28,11 +29,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("config", type=Path, nargs="+", metavar="CONFIG", help=help_)
     parser.add_argument("--follow", action="store_true", help="again every two seconds")
     parser.add_argument(
-        "--timeout", type=float, default=3.0, metavar="S", help="longest wait for a rig (3)"
+        "--timeout",
+        type=number(0, 3600, above=True),
+        default=3.0,
+        metavar="S",
+        help="longest wait for a rig (3)",
     )
     parser.add_argument("--page", type=Path, metavar="FILE.html", help="write a web page instead")
     parser.add_argument("--serve", action="store_true", help="serve a live web page instead")
-    parser.add_argument("--port", type=int, default=0, help="of that page, else a free one")
+    parser.add_argument("--port", type=PORT, default=0, help="of that page, else a free one")
     parser.add_argument("--open", action="store_true", help="open it in this machine's browser")
 
 

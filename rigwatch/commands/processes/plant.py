@@ -4,6 +4,8 @@ import argparse
 import json
 from pathlib import Path
 
+from rigwatch.commands.common.numbers import POSITIVE, number, whole
+
 HELP = (
     "serve the simulated rig, change it while it runs, or record a scenario faster than real time"
 )
@@ -22,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     talk.add_argument(
         "--set", action="append", default=[], metavar="EFFECT=VALUE", help="set an effect"
     )
-    talk.add_argument("--over", type=float, default=0.0, metavar="S", help="as a ramp over S")
+    talk.add_argument("--over", type=number(0), default=0.0, metavar="S", help="as a ramp over S")
     talk.add_argument("--clear", action="store_true", help="remove all effects")
     talk.add_argument("--effects", action="store_true", help="list the effects and their values")
     talk.add_argument(
@@ -32,9 +34,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     record = parser.add_argument_group("record faster than real time")
     record.add_argument("--session", type=Path, metavar="OUT.mcap", help="write a session here")
     record.add_argument(
-        "--seconds", type=float, metavar="S", help="length; default: the scenario's"
+        "--seconds", type=POSITIVE, metavar="S", help="length; default: the scenario's"
     )
-    record.add_argument("--seed", type=int, default=1, metavar="N", help="of the sensors' noise")
+    record.add_argument(
+        "--seed", type=whole(0), default=1, metavar="N", help="of the sensors' noise"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:

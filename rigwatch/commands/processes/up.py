@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rigwatch.commands.common import file_or_name
+from rigwatch.commands.common.numbers import POSITIVE
 from rigwatch.supervisor import PROCESSES, Console, Flow, RigSet, Supervisor, planned
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.host import Heartbeat, endpoint_address, is_free
@@ -32,7 +33,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"omit one of {', '.join(PROCESSES)}; may be given more than once",
     )
     parser.add_argument(
-        "--seconds", type=float, default=float("inf"), metavar="N", help="stop after this time"
+        "--seconds",
+        type=POSITIVE,
+        default=float("inf"),
+        metavar="N",
+        help="stop after this time",
     )
 
 

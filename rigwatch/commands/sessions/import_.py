@@ -13,6 +13,7 @@ from rigwatch.commands.common import (
     say,
     the_one,
 )
+from rigwatch.commands.common.numbers import whole
 from rigwatch.wire.errors import ImportDataError
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--device", help="the device's name in the session")
     parser.add_argument("--rig", help="the rig's id in the session")
     parser.add_argument(
-        "--skip-rows", type=int, metavar="N", help="number of rows to skip at the start"
+        "--skip-rows", type=whole(0), metavar="N", help="number of rows to skip at the start"
     )
     parser.add_argument(
         "--delimiter", help="separator of CSV cells: auto, whitespace, or a character"

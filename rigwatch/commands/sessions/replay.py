@@ -1,7 +1,6 @@
 """`rigwatch replay`: runs the monitor over recordings."""
 
 import argparse
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +15,7 @@ from rigwatch.commands.common import (
     span_of,
     the_one,
 )
+from rigwatch.commands.common.numbers import POSITIVE
 from rigwatch.wire.errors import SessionError
 
 if TYPE_CHECKING:
@@ -38,19 +38,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--config", type=Path, help="configuration of the rig; default: the one recorded with it"
     )
     parser.add_argument(
-        "--speed", type=_speed, default=0.0, metavar="X", help="multiple of real time"
+        "--speed", type=POSITIVE, default=0.0, metavar="X", help="multiple of real time"
     )
     parser.add_argument(
         "--out", type=Path, metavar="SESSION", help="new session of samples, estimates and alarms"
     )
     add_span(parser)
-
-
-def _speed(text: str) -> float:
-    speed = float(text)
-    if not (math.isfinite(speed) and speed > 0):
-        raise ValueError
-    return speed
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigwatch.commands.common import add_many, file_or_name, print_json, run_many, say, the_one
+from rigwatch.commands.common.numbers import POSITIVE
 from rigwatch.commands.structures.structure_files import (
     RECORD,
     add_report,
@@ -38,9 +39,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_many(parser, "record", RECORD)
     parser.add_argument(
-        "--undamaged", type=float, metavar="SECONDS", help="length of the undamaged start"
+        "--undamaged",
+        type=POSITIVE,
+        metavar="SECONDS",
+        help="length of the undamaged start",
     )
-    parser.add_argument("--limit", type=float, help="fixed limit of the residual instead of a test")
+    parser.add_argument(
+        "--limit", type=POSITIVE, help="fixed limit of the residual instead of a test"
+    )
     add_test(
         parser,
         "in a whole record",

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigwatch.commands.common import file_or_name, say
+from rigwatch.commands.common.numbers import number, whole
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.new_file import write_new
 
@@ -34,16 +35,18 @@ def add_problem(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--weighting", default="uniform", help="uniform, exponential:SECONDS or jacobi:A,B"
     )
-    parser.add_argument("--first", type=int, default=0, metavar="SAMPLE", help="first sample used")
+    parser.add_argument(
+        "--first", type=whole(0), default=0, metavar="SAMPLE", help="first sample used"
+    )
 
 
 def add_test(parser: argparse.ArgumentParser, within: str, settle: str) -> None:
     """Arguments of the damage test: `within` names the period of the false-alarm rate."""
     parser.add_argument(
-        "--false-alarms", type=float, default=0.01, metavar="P",
+        "--false-alarms", type=number(0, 1, above=True), default=0.01, metavar="P",
         help=f"probability of any false alarm {within}, default 0.01",
     )  # fmt: skip
-    parser.add_argument("--settle", type=float, default=2.0, metavar="SECONDS", help=settle)
+    parser.add_argument("--settle", type=number(0), default=2.0, metavar="SECONDS", help=settle)
     parser.add_argument(
         "--known",
         action="store_true",

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigwatch.commands.common import file_or_name, say
+from rigwatch.commands.common.numbers import POSITIVE, number, whole
 from rigwatch.wire.errors import ModelError
 
 if TYPE_CHECKING:
@@ -21,15 +22,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the action."""
     parser.add_argument("structure", type=file_or_name("structures"), help="structure file (.toml)")
     parser.add_argument("record", type=Path, help="the new record (.csv or .npz)")
-    parser.add_argument("--dt", type=float, default=0.01, help="time between samples [s]")
-    parser.add_argument("--duration", type=float, default=10.0, help="length [s]")
+    parser.add_argument("--dt", type=POSITIVE, default=0.01, help="time between samples [s]")
+    parser.add_argument("--duration", type=POSITIVE, default=10.0, help="length [s]")
     parser.add_argument(
         "--noise",
-        type=float,
+        type=number(0),
         default=0.0,
         help="standard deviation as a share of each signal's peak",
     )
-    parser.add_argument("--seed", type=int, default=0, help="seed of noise and earthquake")
+    parser.add_argument("--seed", type=whole(0), default=0, help="seed of noise and earthquake")
     parser.add_argument(
         "--damage", nargs=2, action="append", metavar=("SECONDS", "PLACE=VALUE"),
         help="change a number of the file from that time on",

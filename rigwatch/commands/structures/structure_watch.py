@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigwatch.commands.common import file_or_name, print_json
+from rigwatch.commands.common.numbers import POSITIVE
 from rigwatch.commands.structures.structure_files import add_test
 
 if TYPE_CHECKING:
@@ -27,10 +28,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "source", type=Path, help="configuration of the rig (.toml) whose bus to read, or a session"
     )
     parser.add_argument(
-        "--undamaged", type=float, default=2.0, metavar="SECONDS",
+        "--undamaged", type=POSITIVE, default=2.0, metavar="SECONDS",
         help="length of the undamaged start, default 2",
     )  # fmt: skip
-    parser.add_argument("--span", type=float, default=60.0, metavar="SECONDS", help="default 60")
+    parser.add_argument("--span", type=POSITIVE, default=60.0, metavar="SECONDS", help="default 60")
     add_test(
         parser, "within --span", "length of data after an alarm used to find the place, default 2"
     )

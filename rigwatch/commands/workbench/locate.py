@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from rigwatch.commands.common import print_json
+from rigwatch.commands.common.numbers import whole
 
 HELP = "show where a model fails: by time, motion, direction, amplitude, frequency and channel"
 EXAMPLE = "  rigwatch locate emps"
@@ -13,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("study", type=Path, help="the study's folder")
     parser.add_argument("--view", help="only one view, such as motion")
-    parser.add_argument("--most", type=int, default=3, help="number of regions shown per view")
+    parser.add_argument("--most", type=whole(1), default=3, help="number of regions shown per view")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from rigwatch.commands.common import say, tell_address
+from rigwatch.commands.common.numbers import PORT, whole
 
 HELP = "open the studies of a folder in a browser: see, add what is missing, watch the error fall"
 EXAMPLE = """\
@@ -19,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "folder", type=Path, nargs="?", help="folder of studies and recordings, else ./workbench"
     )
     parser.add_argument("--rig", type=Path, metavar="CONFIG", help="configuration of a rig to show")
-    parser.add_argument("--port", type=int, default=0, help="else a free one")
+    parser.add_argument("--port", type=PORT, default=0, help="else a free one")
     parser.add_argument("--address", default="127.0.0.1", help="where it listens")
     parser.add_argument("--certificate", type=Path, metavar="PEM", help="certificate for TLS")
     parser.add_argument("--key", type=Path, metavar="PEM", help="its key")
@@ -31,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="host name of a reverse proxy in front of it that terminates TLS",
     )
     parser.add_argument(
-        "--most-upload", type=int, default=1024, metavar="MB", help="largest upload"
+        "--most-upload", type=whole(1), default=1024, metavar="MB", help="largest upload"
     )
     parser.add_argument("--open", action="store_true", help="open it in this machine's browser")
 
