@@ -138,6 +138,8 @@ def test_two_servers_of_one_machine_do_not_log_each_other_out(page: Page, root: 
 
 
 def test_a_file_that_is_too_long_is_refused_and_leaves_nothing(served: Served) -> None:
+    lock = served.folder / ".uploads" / "lock"
+    eventually(lock.exists, "the server has begun")
     before = sorted(served.folder.rglob("*"))
     whole = ask(served, "/api/upload/long.csv", "PUT", Content_Length=str(1 << 30))
     assert whole[0] == 413

@@ -15,6 +15,7 @@ from rigwatch.browser.recordings.recorded import (
     write_channels,
 )
 from rigwatch.browser.recordings.stories import Story, begin_story, stories
+from rigwatch.browser.recordings.uploads import kept_uploads, new_upload
 from rigwatch.browser.recordings.visible_files import visible_files
 
 __all__ = [
@@ -25,8 +26,10 @@ __all__ = [
     "channels_of",
     "check_session",
     "import_preview",
+    "kept_uploads",
     "look_at",
     "make_study",
+    "new_upload",
     "recordings_in",
     "stories",
     "template_data",

@@ -15,7 +15,7 @@ from starlette.responses import Response
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
-from rigwatch.browser.recordings.uploads import kept_uploads
+from rigwatch.browser.recordings import kept_uploads
 from rigwatch.browser.server import (
     editor_routes,
     import_routes,

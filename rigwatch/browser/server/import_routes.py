@@ -17,11 +17,11 @@ from rigwatch.browser.recordings import (
     import_preview,
     look_at,
     make_study,
+    new_upload,
     recordings_in,
     template_data,
     template_names,
 )
-from rigwatch.browser.recordings.uploads import new_upload
 from rigwatch.browser.server.context import (
     Context,
     answer,

@@ -4,8 +4,7 @@ import argparse
 from datetime import UTC, datetime
 
 from rigwatch.commands.archive.archive_text import table
-from rigwatch.commands.common import print_json, say, unix_time
-from rigwatch.commands.common.numbers import POSITIVE, whole
+from rigwatch.commands.common import POSITIVE, print_json, say, unix_time, whole
 
 HELP = "ask an archive: a named question, or one SELECT on sessions, alarms, losses and seconds"
 EXAMPLE = """\

@@ -4,8 +4,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from rigwatch.commands.archive.archive_text import table
-from rigwatch.commands.common import print_json, say
-from rigwatch.commands.common.numbers import number
+from rigwatch.commands.common import number, print_json, say
 from rigwatch.wire.errors import ArchiveError
 
 if TYPE_CHECKING:

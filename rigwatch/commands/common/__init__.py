@@ -6,6 +6,7 @@ from rigwatch.commands.common.log_arguments import add_log_columns
 from rigwatch.commands.common.many import add_many, add_on, add_where, run_many, the_one
 from rigwatch.commands.common.many_studies import add_studies, run_studies, the_study
 from rigwatch.commands.common.marks import marks_of
+from rigwatch.commands.common.numbers import PORT, POSITIVE, number, whole
 from rigwatch.commands.common.served_page import tell_address
 from rigwatch.commands.common.session_files import (
     add_session_and_target,
@@ -22,6 +23,8 @@ from rigwatch.commands.common.session_files import (
 from rigwatch.commands.common.shipped_argument import file_or_name
 
 __all__ = [
+    "PORT",
+    "POSITIVE",
     "add_log_columns",
     "add_many",
     "add_on",
@@ -33,6 +36,7 @@ __all__ = [
     "damage_lines",
     "file_or_name",
     "marks_of",
+    "number",
     "print_json",
     "ready_to_draw",
     "report_written",
@@ -47,4 +51,5 @@ __all__ = [
     "the_study",
     "unix_time",
     "watched",
+    "whole",
 ]

@@ -4,8 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigwatch.commands.common import print_json, say
-from rigwatch.commands.common.numbers import POSITIVE, whole
+from rigwatch.commands.common import POSITIVE, print_json, say, whole
 from rigwatch.commands.processes.model_place import check_place, install_model
 
 if TYPE_CHECKING:

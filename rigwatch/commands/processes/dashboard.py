@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands.common.numbers import PORT
+from rigwatch.commands.common import PORT
 from rigwatch.wire.errors import ConfigError, RigwatchError
 
 if TYPE_CHECKING:

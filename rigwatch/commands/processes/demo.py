@@ -6,7 +6,7 @@ import sys
 from contextlib import nullcontext
 from pathlib import Path
 
-from rigwatch.commands.common.numbers import POSITIVE
+from rigwatch.commands.common import POSITIVE
 
 HELP = "run a simulated rig: friction appears, an alarm names it, a recording remains"
 EXAMPLE = """  rigwatch demo

@@ -6,8 +6,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands.common import check_folder, print_json, tell_address
-from rigwatch.commands.common.numbers import PORT, number
+from rigwatch.commands.common import PORT, check_folder, number, print_json, tell_address
 
 if TYPE_CHECKING:
     from rigwatch.fleet import Fleet, RigState

@@ -4,7 +4,7 @@ import argparse
 import json
 from pathlib import Path
 
-from rigwatch.commands.common.numbers import POSITIVE, number, whole
+from rigwatch.commands.common import POSITIVE, number, whole
 
 HELP = (
     "serve the simulated rig, change it while it runs, or record a scenario faster than real time"

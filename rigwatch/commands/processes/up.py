@@ -5,8 +5,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from rigwatch.commands.common import file_or_name
-from rigwatch.commands.common.numbers import POSITIVE
+from rigwatch.commands.common import POSITIVE, file_or_name
 from rigwatch.supervisor import PROCESSES, Console, Flow, RigSet, Supervisor, planned
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.host import Heartbeat, endpoint_address, is_free

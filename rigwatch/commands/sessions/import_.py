@@ -12,8 +12,8 @@ from rigwatch.commands.common import (
     run_many,
     say,
     the_one,
+    whole,
 )
-from rigwatch.commands.common.numbers import whole
 from rigwatch.wire.errors import ImportDataError
 
 if TYPE_CHECKING:

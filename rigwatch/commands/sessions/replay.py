@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigwatch.commands.common import (
+    POSITIVE,
     add_many,
     add_span,
     damage_lines,
@@ -15,7 +16,6 @@ from rigwatch.commands.common import (
     span_of,
     the_one,
 )
-from rigwatch.commands.common.numbers import POSITIVE
 from rigwatch.wire.errors import SessionError
 
 if TYPE_CHECKING:

@@ -6,8 +6,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigwatch.commands.common import add_many, file_or_name, print_json, run_many, say, the_one
-from rigwatch.commands.common.numbers import POSITIVE
+from rigwatch.commands.common import (
+    POSITIVE,
+    add_many,
+    file_or_name,
+    print_json,
+    run_many,
+    say,
+    the_one,
+)
 from rigwatch.commands.structures.structure_files import (
     RECORD,
     add_report,

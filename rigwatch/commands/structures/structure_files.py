@@ -6,8 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands.common import file_or_name, say
-from rigwatch.commands.common.numbers import number, whole
+from rigwatch.commands.common import file_or_name, number, say, whole
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.new_file import write_new
 

@@ -4,8 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands.common import file_or_name, say
-from rigwatch.commands.common.numbers import POSITIVE, number, whole
+from rigwatch.commands.common import POSITIVE, file_or_name, number, say, whole
 from rigwatch.wire.errors import ModelError
 
 if TYPE_CHECKING:

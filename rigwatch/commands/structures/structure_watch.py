@@ -4,8 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands.common import file_or_name, print_json
-from rigwatch.commands.common.numbers import POSITIVE
+from rigwatch.commands.common import POSITIVE, file_or_name, print_json
 from rigwatch.commands.structures.structure_files import add_test
 
 if TYPE_CHECKING:

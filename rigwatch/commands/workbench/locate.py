@@ -3,8 +3,7 @@
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import print_json
-from rigwatch.commands.common.numbers import whole
+from rigwatch.commands.common import print_json, whole
 
 HELP = "show where a model fails: by time, motion, direction, amplitude, frequency and channel"
 EXAMPLE = "  rigwatch locate emps"

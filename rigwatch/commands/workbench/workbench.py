@@ -3,8 +3,7 @@
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import say, tell_address
-from rigwatch.commands.common.numbers import PORT, whole
+from rigwatch.commands.common import PORT, say, tell_address, whole
 
 HELP = "open the studies of a folder in a browser: see, add what is missing, watch the error fall"
 EXAMPLE = """\
