@@ -112,6 +112,9 @@ class HealthyLimits(Section, frozen=True, kw_only=True):
     steady_drives: Annotated[
         Floats, Meta(description="pace of the drive of each: 2 sin of twice its phase a sample")
     ] = ()
+    steady_drive_energies: Annotated[
+        Floats, Meta(description="energies of the bands of each steady healthy drive, in turn")
+    ] = ()
     steady_energies: Annotated[
         Floats, Meta(description="largest energy over a second of each")
     ] = ()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from monitor.drives import DriveChanges, InputSteps, Steps
+from monitor.drives import BANDS, DriveBands, DriveChanges, DriveStops, InputSteps, Steps
 from monitor.model import EquationsPlant, RemainderSection
 from monitor.observer.lagged_motion import DELAY, EMPTY, MATCHED, STEPPED, FixedLag, MotionColumn
 from monitor.observer.missing_force import LATE_UNIT, HighPassed
@@ -95,9 +95,10 @@ class Observed:
         predicted: the columns of the prediction.
         judged: high-passed columns, see `missing_force`, shape (n, 10); the decision corrects the
             residual for the inputs' edges.
-        steady: False where an input changes suddenly, or steps between samples at a place that is
-            not known yet, shape (n,).
+        steady: False where an input changes suddenly, stops, or steps between samples at a place
+            that is not known yet, shape (n,).
         drive: pace of the first input, see `monitor.drives.Drive`, shape (n,).
+        bands: energies of the first input, see `monitor.drives.DriveBands`, shape (n, bands).
     """
 
     state: Codes
@@ -107,6 +108,7 @@ class Observed:
     judged: FloatArray
     steady: BoolArray
     drive: FloatArray
+    bands: FloatArray
 
     def part(self, begin: int, end: int) -> "Observed":
         """Samples `begin` to before `end`."""
@@ -116,7 +118,7 @@ class Observed:
         )
         return Observed(
             self.state[at], self.rows[at], self.measured[at], predicted, self.judged[at],
-            self.steady[at], self.drive[at],
+            self.steady[at], self.drive[at], self.bands[at],
         )  # fmt: skip
 
 
@@ -186,6 +188,8 @@ class ObserverSignals:
         self._motion = LaggedSignals(self.layout, plant.half_width, rate, plant.late, jitters)
         self._along = AlongMotion(plant, rate)
         self._drives = [DriveChanges() for _ in range(self.layout.motions[0])]
+        self._bands = [DriveBands() for _ in self._drives[:1]]
+        self._stops = [DriveStops() for _ in self._drives]
         self.remainder_size = len(self.layout.motions) + self._along.hidden
         self._corner, self._rate = plant.corner, rate
         self.follow(remainder)
@@ -223,8 +227,12 @@ class ObserverSignals:
         drives = [own.update(signals[:, place], code) for place, own in enumerate(self._drives)]
         for own in drives:
             steady &= ~own.changed
+        for place, stops in enumerate(self._stops):
+            steady &= ~stops.update(signals[:, place], code)
         pace = drives[0].pace if drives else np.zeros(code.size)
-        return Observed(state, rows, measured, predicted, judged, steady, pace)
+        energies = [own.update(signals[:, 0], code) for own in self._bands]
+        bands = energies[0] if energies else np.zeros((code.size, BANDS))
+        return Observed(state, rows, measured, predicted, judged, steady, pace, bands)
 
 
 def remainder_signals(rows: FloatArray, hidden: FloatArray, layout: Layout) -> FloatArray:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from monitor.clipping import Clipping
-from monitor.drives import BridgedEdges
+from monitor.drives import BridgedEdges, RecordedDrives
 from monitor.model import EquationsPlant, RigModel
 from monitor.observer import (
     EMPTY,
@@ -82,6 +82,7 @@ class ObserverMonitor:
         self._edges = [BridgedEdges() for _ in range(layout.motions[0])]
         self._state = d.new_state(1 + 2 * len(layout.motions))
         self._since = 0
+        self._recorded = RecordedDrives(model.healthy.steady_drive_energies)
         self._usual = UsualError(model.healthy, model.sample_rate)
         self.rules = d.rules_of(model.healthy, model.sample_rate)
         self._clipping = Clipping(model)
@@ -101,7 +102,7 @@ class ObserverMonitor:
         assert remainder is not None
         grown = levels(seen.rows[:, list(layout.motions)], seen.judged[:, PREDICTED], remainder)
         speed = np.ascontiguousarray(seen.rows[:, layout.speed])
-        inside = far <= 1.0
+        inside = (far <= 1.0) | self._recorded.contain(seen.bands)
         known = self.model.motion_range
         assert known is not None
         drive = drive_energy(seen.rows, known, layout.motions)

@@ -11,6 +11,7 @@ from monitor.pipeline.observer_pipeline import ObserverMonitor
 from monitor.pipeline.rig_monitor import RigMonitor
 from monitor.signals.recordings import recording_of
 from rigwatch.wire.errors import ConfigError, ModelError
+from sim_plant.excitation import Recorded
 from sim_plant.scenario import Event
 from tests.monitor.observed_rig import (
     FAULTS,
@@ -136,6 +137,21 @@ def test_gap_restarts_and_says_that_it_is_not_armed() -> None:
     assert not any(flags[name].any() for name in FAULTS)
 
 
+def test_mass_that_comes_to_rest_is_not_judged_until_it_has() -> None:
+    until = np.arange(round(4.0 * RATE))
+    fading = np.interp(until / RATE, [3.8, 4.0], [1.0, 0.0])
+    stops = Recorded(samples=tuple(fading * SINE.source(RATE)(until)))
+
+    found = watched(run(stops, 8.0, seed=8))
+
+    armed = found.estimates.column("armed").values
+    times = np.arange(armed.size) / RATE
+    assert armed[(times > 3.0) & (times < 3.8)].all()
+    assert not armed[(times > 4.05) & (times < 4.95)].any()
+    assert armed[(times > 5.4) & (times < 5.7)].all()
+    assert not FAULTS & raised(found).keys()
+
+
 def test_motion_beyond_the_range_is_reported_and_not_judged() -> None:
     channels = run(SINE, 8.0, seed=8)
     grown = np.interp(np.arange(round(8.0 * RATE)) / RATE, [5.0, 6.0], [1.0, 8.0])
@@ -146,6 +162,15 @@ def test_motion_beyond_the_range_is_reported_and_not_judged() -> None:
 
     assert "not_judged" in names
     assert not names & {"dry_friction", "stiction"}
+
+
+def test_motion_beyond_the_range_is_judged_under_a_drive_that_was_recorded() -> None:
+    stronger = (Event(at_s=6.0, effect="actuator_gain", value=1.6),)
+
+    names = raised(watched(run(SINE, 10.0, stronger, seed=31))).keys()
+
+    assert "other_fault" in names
+    assert not names & {"not_judged", "dry_friction", "stiction"}
 
 
 def test_model_file_keeps_every_bit() -> None:

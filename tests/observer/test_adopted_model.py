@@ -15,7 +15,7 @@ ADOPTED = 1024
 
 
 def narrower() -> RigModel:
-    """The model with 0.3 of the range, and no remainder."""
+    """The model with 0.3 of the range, no drive that was recorded, and no remainder."""
     known = model()
     assert known.motion_range is not None
     assert known.remainder is not None
@@ -23,11 +23,13 @@ def narrower() -> RigModel:
         tuple(0.3 * value for value in side)
         for side in (known.motion_range.low, known.motion_range.high)
     )
+    assert known.healthy is not None
     none = tuple(0.0 for _ in known.remainder.weights)
     return replace(
         known,
         motion_range=replace(known.motion_range, low=low, high=high),
         remainder=replace(known.remainder, weights=none),
+        healthy=replace(known.healthy, steady_drive_energies=()),
     )
 
 

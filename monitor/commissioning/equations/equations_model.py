@@ -72,6 +72,7 @@ def equations_model(  # noqa: PLR0917 -- all that was found
             o.state,
             motion,
             drive,
+            o.bands[begin:],
         )
         for o, motion, drive in zip(parts, motions, drives, strict=True)
     ]

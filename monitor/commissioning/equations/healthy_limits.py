@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
+from monitor.drives import steady_energies
 from monitor.model import HealthyLimits
 from monitor.observer import (
     DEVIATIONS,
@@ -35,9 +36,9 @@ LOW, HIGH = 5.0, 90.0
 @dataclass(frozen=True, eq=False)
 class HealthyPart:
     """A healthy recording: judged columns, speed, levels of the motion, energy of the drive,
-    states, spectrum, and pace of the drive.
+    states, spectrum, and pace and energies of the drive.
 
-    The last two begin after the start, during which they are transient.
+    The last three begin after the start, during which they are transient.
     """
 
     judged: FloatArray
@@ -47,6 +48,7 @@ class HealthyPart:
     state: Codes
     motion: Spectrum
     pace: FloatArray
+    bands: FloatArray
 
     def energies(self, column: int, skip: int) -> FloatArray:
         """Mean squares of a judged column over medium windows."""
@@ -95,6 +97,7 @@ def healthy_limits(
         steady_sizes=tuple(motion.size for motion in steady),
         steady_narrow=tuple(motion.narrow for motion in steady),
         steady_drives=tuple(motion.drive for motion in steady),
+        steady_drive_energies=tuple(e for p in parts for e in steady_energies(p.bands)),
         steady_energies=tuple(motion.extremes.lasting for motion in steady),
         steady_shorts=tuple(motion.extremes.short for motion in steady),
         steady_mediums=tuple(motion.extremes.medium for motion in steady),

@@ -1,0 +1,62 @@
+"""Drives that stop: an input that stays where it is for longer than it usually does.
+
+A mass that comes to rest moves as it never does under a drive, which is no fault. Squares and held
+readings stay as well, and slow tones at their peaks: the longest stay of the last seconds counts.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes
+from rigwatch.wire.arrays import BoolArray, FloatArray
+from rigwatch.wire.kernel import kernel
+
+FLAT = 0.005
+"""Change between samples, relative to the recent range, that is none: a loop still drifts."""
+LONGER, LEAST = 1.5, 3.0
+"""A stop is a stay longer than the usual one by this factor and this many samples."""
+TWICE, MORE = 2.0, 8.0
+"""What one stay adds to the usual one at most: a stop is not usual, a slow square soon is."""
+RANGE_MEMORY, STAY_MEMORY = 256.0, 2048.0
+"""Changes in which the recent range, and samples in which the usual stay, become a new drive's."""
+LAST, LOW, HIGH, STAY, USUAL = range(5)
+"""Carried figures: the last sample, the recent range, how long the input stays, and usually."""
+
+
+class DriveStops:
+    """Follows one input, block by block."""
+
+    def __init__(self) -> None:
+        self._kept = np.zeros(5)
+
+    def update(self, signal: FloatArray, code: Codes) -> BoolArray:
+        """Where an input of shape (n,) is found to have stopped, shape (n,)."""
+        found = np.zeros(code.size, np.bool_)
+        _advance(np.ascontiguousarray(signal), code, self._kept, found)
+        return found
+
+
+@kernel()
+def _advance(signal: FloatArray, code: Codes, kept: FloatArray, found: NDArray[np.bool_]) -> None:
+    for k in range(code.size):
+        if code[k] == DEAD:
+            continue
+        value = signal[k]
+        if code[k] == RESTART or code[k] == NEW_BOOT:
+            kept[LAST] = kept[LOW] = kept[HIGH] = value
+            kept[STAY] = kept[USUAL] = 0.0
+        kept[LOW], kept[HIGH] = min(value, kept[LOW]), max(value, kept[HIGH])
+        extent = kept[HIGH] - kept[LOW]
+        kept[USUAL] -= kept[USUAL] / STAY_MEMORY
+        moves = abs(value - kept[LAST]) > FLAT * extent
+        kept[LAST] = value
+        if moves:
+            longest = TWICE * kept[USUAL] + MORE
+            kept[USUAL] = max(kept[USUAL], min(kept[STAY], longest))
+            kept[LOW] = min(value, kept[LOW] + extent / RANGE_MEMORY)
+            kept[HIGH] = max(value, kept[HIGH] - extent / RANGE_MEMORY)
+            kept[STAY] = 0.0
+            continue
+        before, allowed = kept[STAY], LONGER * kept[USUAL] + LEAST
+        kept[STAY] += 1.0
+        found[k] = before <= allowed < kept[STAY]
