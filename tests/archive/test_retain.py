@@ -111,6 +111,6 @@ def test_without_a_limit_or_an_index_nothing_begins(tmp_path, capsys):
     assert main(["archive", "retain", str(tmp_path)]) == 2
     assert "expected --keep-days" in capsys.readouterr().err
     assert main(["archive", "retain", str(tmp_path), "--keep-days", "-1"]) == 2
-    assert "keep_days" in capsys.readouterr().err
+    assert "--keep-days" in capsys.readouterr().err
     with pytest.raises(ArchiveError, match="has no index"):
         retain(Store(str(tmp_path)), RecorderSection(keep_days=1))
