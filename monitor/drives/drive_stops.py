@@ -15,8 +15,10 @@ FLAT = 0.005
 """Change between samples, relative to the recent range, that is none: a loop still drifts."""
 LONGER, LEAST = 1.5, 3.0
 """A stop is a stay longer than the usual one by this factor and this many samples."""
-TWICE, MORE = 2.0, 8.0
-"""What one stay adds to the usual one at most: a stop is not usual, a slow square soon is."""
+PAUSE, TWICE = 256.0, 2.0
+"""A stay is usual from its first time on if it is no longer than this [samples] or than the usual
+one by this factor: the half period of a square is, a stop is not.
+"""
 RANGE_MEMORY, STAY_MEMORY = 256.0, 2048.0
 """Changes in which the recent range, and samples in which the usual stay, become a new drive's."""
 LAST, LOW, HIGH, STAY, USUAL = range(5)
@@ -51,7 +53,7 @@ def _advance(signal: FloatArray, code: Codes, kept: FloatArray, found: NDArray[n
         moves = abs(value - kept[LAST]) > FLAT * extent
         kept[LAST] = value
         if moves:
-            longest = TWICE * kept[USUAL] + MORE
+            longest = max(TWICE * kept[USUAL], PAUSE)
             kept[USUAL] = max(kept[USUAL], min(kept[STAY], longest))
             kept[LOW] = min(value, kept[LOW] + extent / RANGE_MEMORY)
             kept[HIGH] = max(value, kept[HIGH] - extent / RANGE_MEMORY)
