@@ -76,7 +76,7 @@ def scoring(data: Data, repeats: int) -> Row:
         begin = time.perf_counter()
         scores = score_all(data, base, found)
         middle = time.perf_counter()
-        corrected_p_values(scores, residual, base.train.residuals.shape[-1])
+        corrected_p_values(scores, residual, len(base.train.residuals))
         taken["scores"].append(middle - begin)
         taken["p-values"].append(time.perf_counter() - middle)
     phases = {name: statistics.median(seconds[1:]) for name, seconds in taken.items()}

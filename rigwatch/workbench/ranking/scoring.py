@@ -87,7 +87,7 @@ def scored(
     """
     scores = score_all(data, base, found)
     residual = np.nan_to_num(base.train.residuals / base.train.scale).ravel()
-    p_values = corrected_p_values(scores, residual, base.train.residuals.shape[-1])
+    p_values = corrected_p_values(scores, residual, len(base.train.residuals))
     strengths = scores.strength.tolist()
     allowed = [every or possible(c, at) for c, at in zip(found, strengths, strict=True)]
     ports = study.model.ports

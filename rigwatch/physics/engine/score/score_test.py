@@ -33,8 +33,6 @@ class Scores:
         explained: share of the residual's energy, shape (k,).
         cosines: between projected directions, absolute, shape (k, k).
         units: the projected directions, of unit length, shape (windows·samples, k).
-        fitted: orthonormal directions of everything already fitted, each window's initial states
-            apart, shape (windows, samples, n).
     """
 
     score: FloatArray
@@ -44,7 +42,6 @@ class Scores:
     explained: FloatArray
     cosines: FloatArray
     units: FloatArray
-    fitted: FloatArray
 
 
 class Projector:
@@ -63,12 +60,6 @@ class Projector:
     def _without_starts(self, signals: FloatArray) -> FloatArray:
         along = np.einsum("wki,wkc->wic", self._starts, signals)
         return np.asarray(signals - np.einsum("wki,wic->wkc", self._starts, along))
-
-    @property
-    def basis(self) -> FloatArray:
-        """Orthonormal directions, each window's initial states apart, shape (windows, k, n + m)."""
-        together = self._parameters.reshape(*self._starts.shape[:2], -1)
-        return np.concatenate([self._starts, together], axis=2)
 
     def clean(self, signals: FloatArray) -> FloatArray:
         """Projected `signals` (windows, k, c), windows stacked: shape (windows·k, c)."""
@@ -107,5 +98,4 @@ def score(
         along**2 / max(float(r @ r), 1e-300),
         np.abs(unit.T @ unit),
         unit,
-        fitted.basis,
     )
