@@ -31,6 +31,7 @@ class Rig:
     def say(self) -> None:
         counters = {"lost_samples": 0.0, "latency_p99_ms": 7.5}
         self.monitor.publish(HEALTH, Health("monitor", 1, "running", "", counters))
+        self.daq.publish(HEALTH, Health("daq", 1, "running", "", {}))
 
 
 @pytest.fixture(scope="module")

@@ -70,6 +70,7 @@ def rigs(tmp_path: Path):
 def test_the_fleet_is_seen_and_a_rig_that_goes_moves_up(rigs, tmp_path, capsys):
     paths, monitor = rigs
     fleet = Fleet(paths, timeout=5.0)
+    eventually(lambda: fleet.look()[-1].figures["samples"] > 0, "the first samples")
     away, stands, runs = fleet.look()
     fleet.close()
     assert (away.rig, away.rank) == ("away", UNREACHABLE)
@@ -77,7 +78,6 @@ def test_the_fleet_is_seen_and_a_rig_that_goes_moves_up(rigs, tmp_path, capsys):
     assert (stands.rig, stands.rank, stands.missing) == ("stands", GONE, ("daq",))
     assert runs.rig == "runs"
     assert runs.rank < GONE
-    assert runs.figures["samples"] > 0
     assert as_lines([away, stands, runs])[-1].startswith("3 rigs: ")
     page = tmp_path / "fleet.html"
     words = ["fleet", *map(str, paths[:2]), "--json", "--page", str(page)]

@@ -101,7 +101,7 @@ def test_a_model_is_begun_and_checked(tmp_path: Path, capsys: pytest.CaptureFixt
     assert (tmp_path / "run_2.svg").is_file()
 
     assert main(["model", "new", str(file)]) == 2
-    assert "found a file" in capsys.readouterr().err
+    assert "the file exists already" in capsys.readouterr().err
     assert main(["model", "check", str(file), "--input", "torque=1"]) == 2
     assert "found input 'torque'" in capsys.readouterr().err
     assert main(["model", "list", "--json"]) == 0

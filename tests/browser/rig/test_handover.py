@@ -22,7 +22,7 @@ def model(tmp_path: Path) -> Path:
     """The model of a rig with a recording."""
     made = tmp_path / "model.toml"
     made.write_text(model_text(MODEL))
-    recorded = tmp_path / "sessions" / "drive-1"
+    recorded = tmp_path / "sessions" / "drive-20260101T000000Z"
     recorded.mkdir(parents=True)
     with SessionWriter(recorded / "000001.mcap", run_info("drive", RATE), sync=False) as writer:
         writer.write(block(3))
