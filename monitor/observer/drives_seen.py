@@ -26,6 +26,8 @@ TONE = 0.75
 """Narrowness below which a motion is broadband noise, which has no kind."""
 FARTHEST = 10.0
 """Largest distance that is told apart, where 1 is the limit."""
+AT_ONCE = 1024
+"""Motions that are compared with all kinds at once: a recording has 10⁵, and hundreds of kinds."""
 
 
 def kinds_of(
@@ -56,10 +58,14 @@ class DrivesSeen:
         found = np.zeros(drive.size)
         judged = (drive > 0.0) & (motion.pace > 0.0) & (motion.narrow >= TONE)
         if self._cells.size and judged.any():
-            away = _logarithms(drive[judged], motion.pace[judged])[:, None] - self._cells
-            nearest = (np.abs(away) / (DRIVE, MOTION)).max(axis=2).min(axis=1)
-            found[judged] = np.minimum(nearest, FARTHEST)
+            own = _logarithms(drive[judged], motion.pace[judged])
+            parts = (own[first : first + AT_ONCE] for first in range(0, len(own), AT_ONCE))
+            found[judged] = np.concatenate([self._nearest(part) for part in parts])
         return found
+
+    def _nearest(self, own: FloatArray) -> FloatArray:
+        away = np.abs(own[:, None] - self._cells) / (DRIVE, MOTION)
+        return np.asarray(np.minimum(away.max(axis=2).min(axis=1), FARTHEST))
 
 
 def _logarithms(drive: FloatArray, pace: FloatArray) -> FloatArray:

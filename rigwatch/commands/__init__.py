@@ -22,11 +22,15 @@ import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 from rigwatch.commands.any_text import write_any_text
 from rigwatch.commands.unwinding import unwound_at_signal
 from rigwatch.version import __version__
 from rigwatch.wire.errors import RigwatchError, reason_of
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
 
 COMMANDS: dict[str, str] = {
     # name on the command line: module below rigwatch.commands
@@ -87,7 +91,11 @@ def _run(given: Sequence[str]) -> int:
     """Run a command; returns the exit code."""
     try:
         _refuse_undecodable(given)
-        arguments = _parser(given).parse_args(given)
+        try:
+            arguments = _parser(given).parse_args(given)
+        except SystemExit:
+            sys.stdout.flush()  # the help, which at the end of the process nobody would miss
+            raise
         code = int(arguments.run(arguments))
         sys.stdout.flush()
         return code
@@ -127,8 +135,15 @@ def every_command(
         yield from every_command(_actions(module), f"{above} {name}")
 
 
+class _Parser(argparse.ArgumentParser):
+    """Raises when its help cannot be written, which argparse passes over."""
+
+    def _print_message(self, message: str, file: "SupportsWrite[str] | None" = None) -> None:
+        print(message, end="", file=file or sys.stderr)
+
+
 def _parser(argv: Sequence[str]) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="rigwatch",
         description="Monitors a test rig against its model and finds what the model lacks.",
     )

@@ -15,6 +15,7 @@ from rigwatch.wire.session import SessionWriter, run_info
 
 NAME = "Δp → 🙂"
 COMMANDS = ["info RUN", "info RUN --json", "effects --json", "archive query ROOT rigs"]
+HELP = ["--help", "--version", "study --help", "import --help"]
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +46,7 @@ def test_an_encoding_that_lacks_characters_gets_escapes(root: Path, command: str
         assert json.loads(done.stdout.decode("latin-1")) == json.loads(plain.stdout)
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", [*COMMANDS, *HELP])
 def test_a_full_disk_and_a_closed_pipe_are_told_by_the_exit_code(root: Path, command: str) -> None:
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(

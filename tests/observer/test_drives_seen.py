@@ -1,11 +1,13 @@
 """Which kinds of drive and motion are judged."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from msgspec import structs
 
 from monitor.model import RangeSection
-from monitor.observer.drives_seen import DrivesSeen, kinds_of
+from monitor.observer.drives_seen import DRIVE, FARTHEST, MOTION, DrivesSeen, kinds_of
 from monitor.observer.spectral_width import Spectrum
 
 N = 64
@@ -61,3 +63,26 @@ def test_model_files_of_earlier_versions_judge_every_kind() -> None:
     old = structs.replace(known(), drive_paces=(), motion_paces=())
 
     assert not DrivesSeen(old).distance(moved(4.0), np.full(N, SQUARE)).any()
+
+
+def test_a_long_recording_is_compared_in_little_memory() -> None:
+    random = np.random.default_rng(1)
+    n, kinds = 50_000, 400
+    paces, frequencies = random.uniform(1.0, 20.0, (2, kinds))
+    seen = structs.replace(
+        known(), drive_paces=tuple(paces.tolist()), motion_paces=tuple(frequencies.tolist())
+    )
+    drive, pace = random.uniform(0.5, 40.0, (2, n))
+    motion = Spectrum(np.ones(n), pace, np.ones(n))
+    tracemalloc.start()
+    try:
+        found = DrivesSeen(seen).distance(motion, drive)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 40e6  # all pairs at once are 640 MB
+    some = slice(0, n, 997)
+    own = np.log(np.column_stack([drive, pace]))[some, None]
+    away = np.abs(own - np.log(np.column_stack([paces, frequencies])))
+    nearest = (away / (DRIVE, MOTION)).max(axis=2).min(axis=1)
+    assert found[some].tolist() == np.minimum(nearest, FARTHEST).tolist()

@@ -48,6 +48,7 @@ def healthy_remainder(
     bare = _observed(used, plant, no_remainder(size), rate, jitters)
     filters, skip = high_pass(plant.corner, rate), round(SKIPPED * rate)
     pairs = [(remainder_signals(o.rows, o.predicted.hidden, layout), o.judged[:, E]) for o in bare]
+    del bare  # a recording's signals, of which six simulations, are a hundred columns
     earlier = [(z[: _split(z)], e[: _split(z)]) for z, e in pairs]
     later = _observed(used, plant, fit_remainder(earlier, filters, skip), rate, jitters)
     steady = [
@@ -59,6 +60,7 @@ def healthy_remainder(
         Left(one.name, one.role, o.judged, spectrum_of(o, layout, slow, rate).pace)
         for one, o in zip(used, later, strict=True)
     ]
+    del later
     found = described(left, plant.model, rate)
     scheme = SchemeSection(
         why="", held_out=found.held_out, share=found.share, described_hz=found.fastest

@@ -1,11 +1,13 @@
 """Foreign recordings as sessions: columns become channels in SI units on a uniform grid of time."""
 
-import time
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 from msgspec import structs
+from numpy.typing import NDArray
 
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ImportDataError
@@ -13,7 +15,7 @@ from rigwatch.wire.exchange.column_units import conversion
 from rigwatch.wire.exchange.grid import Grid, fit_grid, whole
 from rigwatch.wire.exchange.mapping import ImportMapping, Source, parse_source
 from rigwatch.wire.exchange.repeated_stamps import Stamps, increasing
-from rigwatch.wire.exchange.session_columns import is_native, native_blocks
+from rigwatch.wire.exchange.session_columns import is_native, native_blocks, native_rate
 from rigwatch.wire.exchange.table_files import read_table
 from rigwatch.wire.exchange.tables import Table
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock, blocks
@@ -58,19 +60,16 @@ def import_file(source: Path, target: Path, mapping: ImportMapping, start_ns: in
     """
     table = read_table(source, mapping)
     if not mapping.channels and is_native(table):
-        whole = native_blocks(table, mapping.device)
-        rate = mapping.rate or _rate_of(whole)
-        return _write(whole, target, mapping, rate, (f"imported from {source.name}",))
+        rate = mapping.rate or native_rate(table)
+        found = native_blocks(table, mapping.device)
+        return _write(found, target, mapping, rate, (f"imported from {source.name}",))
     if not mapping.channels:
         columns = ", ".join(table.names)
         raise ImportDataError(f"{source}: no channel is mapped, its columns are {columns}")
     base, remarks = _time_base(table, mapping)
-    channels = tuple(
-        _channel(name, text, table, base, mapping) for name, text in mapping.channels.items()
-    )
-    block = _block(mapping.device, channels, base.grid, start_ns)
     remarks = (f"imported from {source.name}", *remarks)
-    return _write([block], target, mapping, base.grid.rate_hz, remarks)
+    found = _sample_blocks(table, base, mapping, start_ns)
+    return _write(found, target, mapping, base.grid.rate_hz, remarks)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +126,7 @@ def _counted(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[str
             f"{table.path}: found neither time nor rate, expected --time 'COLUMN[s]' or --rate HZ;"
             f" its columns are {', '.join(table.names)}"
         )
-    first = _source(*next(iter(mapping.channels.items())), table, mapping)
+    first = _source(*_counting(mapping), table, mapping)
     count = len(table.cells[first.column])
     times = np.arange(count) / mapping.rate
     grid = whole(mapping.rate, times, (0.0, 0.0))
@@ -151,18 +150,46 @@ def _in_si(channel: str, source: Source, table: Table, mapping: ImportMapping) -
         return (factor * values + source.offset) * to_si.factor + to_si.offset
 
 
-def _channel(name: str, text: str, table: Table, base: _TimeBase, mapping: ImportMapping) -> Column:
+def _sample_blocks(
+    table: Table, base: _TimeBase, mapping: ImportMapping, start_ns: int
+) -> Iterator[SampleBlock]:
+    """The samples in the table's parts; those of a jittered recording, interpolated, in one."""
+    counted = _source(*_counting(mapping), table, mapping).column
+    row = first = 0
+    for part in [table] if base.grid.jittered else table.parts():
+        kept = base.stamps.kept[row : row + len(part.cells[counted])]
+        row += len(kept)
+        if kept.any():
+            columns = tuple(
+                _channel(name, text, part, kept, mapping) for name, text in mapping.channels.items()
+            )
+            if base.grid.jittered:
+                columns = tuple(_resampled(c, base.grid, base.stamps.times) for c in columns)
+            yield _block(mapping.device, columns, base.grid, first, start_ns)
+            first += len(columns[0].values)
+
+
+def _counting(mapping: ImportMapping) -> tuple[str, str]:
+    """The column whose length counts, as channel and source."""
+    return ("time", mapping.time) if mapping.time else next(iter(mapping.channels.items()))
+
+
+def _channel(
+    name: str,
+    text: str,
+    table: Table,
+    kept: NDArray[np.bool_],
+    mapping: ImportMapping,
+) -> Column:
     source = _source(name, text, table, mapping)
     unit = conversion(source.unit, name, any_unit=mapping.any_unit).unit
     values = _in_si(name, source, table, mapping)
-    kept, times = base.stamps.kept, base.stamps.times
     if len(values) != len(kept):
         found = f"found {len(values)} values, expected {len(kept)} as there are times"
         raise ImportDataError(f"{table.path}: {name}: {found}")
     values = values[kept]
     flags = np.where(np.isfinite(values), quality.GOOD, quality.NON_FINITE).astype(np.uint8)
-    column = Column(name, unit, values, flags)
-    return _resampled(column, base.grid, times) if base.grid.jittered else column
+    return Column(name, unit, values, flags)
 
 
 def _resampled(column: Column, grid: Grid, times: FloatArray) -> Column:
@@ -179,33 +206,33 @@ def _resampled(column: Column, grid: Grid, times: FloatArray) -> Column:
     return Column(column.name, column.unit, found, marks)
 
 
-def _block(device: str, columns: tuple[Column, ...], grid: Grid, start_ns: int) -> SampleBlock:
-    since_start = np.round((grid.times - grid.times[0]) * 1e9).astype(np.int64)
+def _block(
+    device: str, columns: tuple[Column, ...], grid: Grid, first: int, start_ns: int
+) -> SampleBlock:
+    """The samples from number `first` of the grid on."""
+    times = grid.times[first : first + len(columns[0].values)]
+    since_start = np.round((times - grid.times[0]) * 1e9).astype(np.int64)
     first_ns = start_ns + round(float(grid.times[0]) * 1e9)
     if first_ns < 0:
         first_ns = start_ns
-    t_ns = first_ns + since_start
-    return SampleBlock(device, 1, 0, since_start // 1000, t_ns, columns)
-
-
-def _rate_of(whole: list[SampleBlock] | list[EstimateBlock]) -> float:
-    steps = np.concatenate([np.diff(block.t_ns) for block in whole])
-    return float(f"{1e9 / float(np.median(steps)):.9g}") if len(steps) else 0.0
+    return SampleBlock(device, 1, first, since_start // 1000, first_ns + since_start, columns)
 
 
 def _write(
-    whole: list[SampleBlock] | list[EstimateBlock],
+    found: Iterator[SampleBlock | EstimateBlock],
     target: Path,
     mapping: ImportMapping,
     rate: float,
     remarks: tuple[str, ...],
 ) -> Imported:
     notes = "; ".join(filter(None, (*remarks, mapping.notes)))
-    began = int(whole[0].t_ns[0]) if whole else time.time_ns()
-    run = run_info(mapping.rig, rate, t_ns=began, notes=notes)
+    first = next(found)
+    run = run_info(mapping.rig, rate, t_ns=int(first.t_ns[0]), notes=notes)
+    samples = 0
     with new_file(target) as part, SessionWriter(part, run, sync=False) as writer:
-        for block in whole:
+        for block in chain([first], found):
+            samples += len(block)
             for piece in blocks.pieces(block, LARGEST_BLOCK):  # type: ignore[type-var]
                 writer.write(piece)
-    units = {column.name: column.unit for column in blocks.columns_of(whole[0])}
-    return Imported(target, sum(map(len, whole)), rate, units, remarks)
+    units = {column.name: column.unit for column in blocks.columns_of(first)}
+    return Imported(target, samples, rate, units, remarks)

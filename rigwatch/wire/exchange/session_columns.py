@@ -6,6 +6,7 @@ Only tables of samples have `device_us`. `export` writes them; reading one resto
 """
 
 import re
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -46,28 +47,39 @@ def is_native(table: Table) -> bool:
     return {BOOT, SEQ, T_NS} <= set(table.names)
 
 
-def native_blocks(table: Table, device: str) -> list[SampleBlock] | list[EstimateBlock]:
-    """The blocks of a table in this layout: one for each run of consecutive samples.
+def native_rate(table: Table) -> float:
+    """The rate of a table in this layout by the median step of consecutive samples, 0 if none.
+
+    Raises:
+        ImportDataError: a cell is no whole number; file, line and column are named.
+    """
+    rows = [[part.integers(name) for name in (BOOT, SEQ, T_NS)] for part in table.parts()]
+    boot, seq, t_ns = (np.concatenate(parts) for parts in zip(*rows, strict=True))
+    steps = np.diff(t_ns)[(np.diff(seq) == 1) & (np.diff(boot) == 0)]
+    return float(f"{1e9 / float(np.median(steps)):.9g}") if len(steps) else 0.0
+
+
+def native_blocks(table: Table, device: str) -> Iterator[SampleBlock | EstimateBlock]:
+    """The blocks of a table in this layout: one for each run of consecutive samples of a part.
 
     Raises:
         ImportDataError: a cell is not what its column holds; file, line and column are named.
     """
+    for part in table.parts():
+        yield from _blocks_of(part, device)
+
+
+def _blocks_of(table: Table, device: str) -> Iterator[SampleBlock | EstimateBlock]:
     boot, seq, t_ns = (table.integers(name) for name in (BOOT, SEQ, T_NS))
     columns = tuple(_columns(table))
+    sampled = table.integers(DEVICE_US) if DEVICE_US in table.names else None
     breaks = np.flatnonzero((np.diff(seq) != 1) | (np.diff(boot) != 0)) + 1
-    spans = [slice(a, b) for a, b in zip([0, *breaks], [*breaks, len(seq)], strict=True)]
-    if DEVICE_US not in table.names:
-        return [
-            EstimateBlock(device, int(boot[s.start]), int(seq[s.start]), t_ns[s], _cut(columns, s))
-            for s in spans
-        ]
-    device_us = table.integers(DEVICE_US)
-    return [
-        SampleBlock(
-            device, int(boot[s.start]), int(seq[s.start]), device_us[s], t_ns[s], _cut(columns, s)
-        )
-        for s in spans
-    ]
+    for a, b in zip([0, *breaks], [*breaks, len(seq)], strict=True):
+        of, cut = (device, int(boot[a]), int(seq[a])), _cut(columns, slice(a, b))
+        if sampled is None:
+            yield EstimateBlock(*of, t_ns[a:b], cut)
+        else:
+            yield SampleBlock(*of, sampled[a:b], t_ns[a:b], cut)
 
 
 def _columns(table: Table) -> list[Column]:

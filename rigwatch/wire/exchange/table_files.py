@@ -1,7 +1,5 @@
 """Reads CSV, MAT, JSON and Parquet files as tables of named columns."""
 
-import csv
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,6 +8,7 @@ import numpy as np
 
 from rigwatch.wire.errors import ImportDataError, MissingExtraError, reason_of
 from rigwatch.wire.exchange.budget import Budget
+from rigwatch.wire.exchange.csv_table import read_csv
 from rigwatch.wire.exchange.json_table import read_json
 from rigwatch.wire.exchange.mapping import ImportMapping
 from rigwatch.wire.exchange.mat5 import MatError, Value, read_mat5
@@ -20,9 +19,6 @@ FORMATS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".dat": "csv"} | {
     ".parquet": "parquet",
     ".json": "json",
 }
-_DELIMITERS = ";\t,"
-"""Delimiters, in the order in which they are tried."""
-_DECIMAL_COMMA = re.compile(r"^\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*$")
 
 
 def read_table(path: Path, mapping: ImportMapping) -> Table:
@@ -55,65 +51,6 @@ def columns_of(path: Path) -> tuple[dict[str, Any], dict[str, float]]:
     """
     table = read_table(path, ImportMapping())
     return dict(table.cells), table.scalars
-
-
-def _read_csv(path: Path, mapping: ImportMapping) -> Table:
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except UnicodeDecodeError as error:
-        raise ImportDataError(f"{path}: found bytes that are not UTF-8, expected text") from error
-    while lines and not lines[-1].strip():
-        lines.pop()
-    if not lines:
-        raise ImportDataError(f"{path}: the file is empty, expected rows of data")
-    try:
-        rows = _rows(lines, mapping.delimiter)
-    except ImportDataError as error:
-        raise ImportDataError(f"{path}: {error}") from None
-    if not mapping.columns and _all_numbers(rows[0]):
-        raise ImportDataError(
-            f"{path}:1: found numbers, expected names of columns; name the {len(rows[0])} columns"
-            " with --columns A,B,…"
-        )
-    header = [name.strip() for name in (mapping.columns or rows.pop(0))]
-    first_line = 1 if mapping.columns else 2
-    if len(set(header)) < len(header):
-        raise ImportDataError(f"{path}:1: found the columns {header}, expected different names")
-    for number, row in enumerate(rows):
-        if len(row) != len(header):
-            where = f"{path}:{number + first_line}"
-            raise ImportDataError(f"{where}: found {len(row)} cells, expected {len(header)}")
-    rows = _with_points(rows)
-    columns = zip(*rows, strict=True) if rows else [()] * len(header)
-    return Table(path, dict(zip(header, columns, strict=True)), first_line=first_line)
-
-
-def _all_numbers(cells: list[str]) -> bool:
-    return all(re.fullmatch(r"\s*[+-]?\d*[.,]?\d+([eE][+-]?\d+)?\s*", cell) for cell in cells)
-
-
-def _with_points(rows: list[list[str]]) -> list[list[str]]:
-    """Rows with decimal commas replaced by decimal points."""
-    return [[_pointed(cell) for cell in row] if any("," in c for c in row) else row for row in rows]
-
-
-def _pointed(cell: str) -> str:
-    return cell.replace(",", ".") if "," in cell and _DECIMAL_COMMA.match(cell) else cell
-
-
-def _rows(lines: list[str], delimiter: str) -> list[list[str]]:
-    if delimiter == "auto":
-        # With semicolons or tabs as delimiters, commas are decimal commas.
-        delimiter = next((mark for mark in _DELIMITERS if mark in lines[0]), "whitespace")
-    if delimiter == "whitespace":
-        return [line.split() for line in lines]
-    if len(delimiter) != 1:
-        expected = "auto, whitespace or one character"
-        raise ImportDataError(f"delimiter: found {delimiter!r}, expected {expected}")
-    try:
-        return list(csv.reader(lines, delimiter=delimiter))
-    except csv.Error as error:
-        raise ImportDataError(f"not readable as CSV: {error}") from None
 
 
 def _read_mat(path: Path, _: ImportMapping) -> Table:
@@ -175,7 +112,7 @@ def _read_parquet(path: Path, _: ImportMapping) -> Table:
 
 
 _READERS: dict[str, Callable[[Path, ImportMapping], Table]] = {
-    "csv": _read_csv,
+    "csv": read_csv,
     "mat": _read_mat,
     "parquet": _read_parquet,
     "json": _read_json,

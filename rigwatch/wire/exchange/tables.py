@@ -1,9 +1,9 @@
 """Foreign files as tables of named columns, whose errors name file, line and column."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from rigwatch.wire.errors import ImportDataError
 
 Cells = Sequence[str] | np.ndarray[Any, Any]
 """A column as it was read, text or numbers."""
+A = TypeVar("A", FloatArray, IntArray)
 
 
 @dataclass
@@ -46,6 +47,10 @@ class Table:
         cells = self.cells[column]
         return isinstance(cells, np.ndarray) and cells.dtype.kind in "mM"
 
+    def parts(self) -> Iterator["Table"]:
+        """The rows in parts that fit into memory: here all of them, which are there already."""
+        yield self
+
     def numbers(self, column: str, allow_missing: bool = False) -> FloatArray:
         """A column as numbers; dates since 1970 and durations in seconds.
 
@@ -56,6 +61,9 @@ class Table:
         Raises:
             ImportDataError: a cell is no number; its place is named.
         """
+        return _joined([part._numbers(column, allow_missing) for part in self.parts()])
+
+    def _numbers(self, column: str, allow_missing: bool) -> FloatArray:
         cells = self.cells[column]
         try:
             values = _in_seconds(np.asarray(cells)).astype(np.float64)
@@ -86,6 +94,9 @@ class Table:
         Raises:
             ImportDataError: a cell is no whole number; its place is named.
         """
+        return _joined([part._integers(column) for part in self.parts()])
+
+    def _integers(self, column: str) -> IntArray:
         cells = self.cells[column]
         if isinstance(cells, np.ndarray) and cells.dtype.kind in "iu":
             return cells.astype(np.int64)
@@ -104,6 +115,10 @@ class Table:
         cells = {name: column[rows:] for name, column in self.cells.items()}
         line = None if self.first_line is None else self.first_line + rows
         return Table(self.path, cells, self.scalars, line)
+
+
+def _joined(parts: list[A]) -> A:
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def _in_seconds(cells: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
