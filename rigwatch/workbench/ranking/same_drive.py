@@ -6,7 +6,7 @@ or less than on the healthy rig, the motion itself has changed. In a loop that i
 faulty sensor the inputs change with the motion, and nothing follows.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.signal import correlate
@@ -40,8 +40,7 @@ def denied_sensors(study: Study, data: Data) -> dict[str, str]:
     """
     if data.healthy is None or study.file.effects:
         return {}
-    moved = {sensor.position for sensor in data.motion} | {sensor.rate for sensor in data.motion}
-    drive = [column for column in range(len(study.model.inputs)) if column not in moved]
+    drive = slice(data.train.driving)
     for healthy, test in _pairs(data.healthy, data.train, drive):
         band = _driven(healthy.inputs[:, drive], test.inputs[:, drive])
         if band is not None:
@@ -67,7 +66,7 @@ def _denied(study: Study, data: Data, ratios: dict[str, float]) -> dict[str, str
 
 
 def _pairs(
-    healthy: Recording, test: Recording, drive: Sequence[int]
+    healthy: Recording, test: Recording, drive: slice
 ) -> Iterator[tuple[Recording, Recording]]:
     """What every healthy recording shares with every other one, shifted to where drives agree."""
     for one in _parts(healthy):
