@@ -13,8 +13,7 @@ from scipy.signal import correlate
 
 from rigwatch.physics.engine.fit import Recording
 from rigwatch.wire.arrays import BoolArray, FloatArray
-from rigwatch.workbench.data import Data
-from rigwatch.workbench.data.columns import bridged
+from rigwatch.workbench.data import Data, bridged
 from rigwatch.workbench.study import Study
 
 CHANGED = 1.5
