@@ -1,6 +1,6 @@
 """A study's measured data: signals on one time grid, their scales, and the noise floor."""
 
-from rigwatch.workbench.data.columns import Columns, copies
+from rigwatch.workbench.data.columns import Columns, bridged, copies
 from rigwatch.workbench.data.healthy_elements import with_elements
 from rigwatch.workbench.data.motion import along_motion, predicts_along_motion
 from rigwatch.workbench.data.next_rows import with_next_rows
@@ -34,6 +34,7 @@ __all__ = [
     "NoiseFloor",
     "Part",
     "along_motion",
+    "bridged",
     "copies",
     "find_period",
     "from_residual",

@@ -25,7 +25,7 @@ from rigwatch.workbench.data import Data, MotionSensor
 from rigwatch.workbench.explain.verdict import EQUAL, NEARLY, Verdict, Word
 from rigwatch.workbench.explain.verdict_calibration import Evidence
 from rigwatch.workbench.fit import Fitted, block_differences, fit_model
-from rigwatch.workbench.ranking import Ranked, judge_fit
+from rigwatch.workbench.ranking import Ranked, denied_sensors, judge_fit
 
 STEPS = 2
 """Gauss-Newton steps; the error is nearly linear in the strength."""
@@ -56,7 +56,10 @@ def motion_sensor_rows(bench: Bench) -> list[Ranked]:
     """Candidate effects at the motion sensors, fitted and judged."""
     found = []
     least = WORTH * bench.floor.above(bench.base.train)
+    denied = denied_sensors(bench.study, bench.data)
     for sensor in bench.data.motion:
+        if sensor.port in denied:
+            continue
         for name, direction in DIRECTIONS.items():
             effect = bench.study.effects.get(name)
             if effect is None:

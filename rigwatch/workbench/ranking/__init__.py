@@ -19,6 +19,7 @@ from rigwatch.workbench.ranking.refitting import (
     refit,
     refit_all,
 )
+from rigwatch.workbench.ranking.same_drive import denied_sensors
 from rigwatch.workbench.ranking.scoring import rank_all, rank_only, score_all, scored
 
 __all__ = [
@@ -33,6 +34,7 @@ __all__ = [
     "Ranked",
     "accepted_from",
     "candidates",
+    "denied_sensors",
     "difference",
     "in_order",
     "judge_fit",

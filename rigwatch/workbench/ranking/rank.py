@@ -23,6 +23,7 @@ from rigwatch.workbench.ranking.refitting import (
     refit,
     refit_elsewhere,
 )
+from rigwatch.workbench.ranking.same_drive import denied_sensors
 from rigwatch.workbench.ranking.scoring import scored
 from rigwatch.workbench.study import Study
 
@@ -54,8 +55,12 @@ def rank(
         progress: called with a line of text as each fit begins.
     """
     rows = scored(study, data, base, candidates(study, data.train))
+    denied = denied_sensors(study, data)
+    for row in rows:
+        if row.port in denied:
+            row.reason = row.failure = denied[row.port]
     kind = "dynamic" if study.model.states else "static"
-    chosen = select_for_fit(rows, kind)
+    chosen = select_for_fit([row for row in rows if not row.failure], kind)
     enough = fit_each(study, data, base, floor, chosen, progress)
     if not enough:
         least = AGAIN * floor.above(base.train)

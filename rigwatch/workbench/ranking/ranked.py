@@ -34,7 +34,7 @@ class Ranked:
         gain: fall of the held-out mean squared error, None without a fit.
         accepted: whether the held-out error falls by more than chance.
         reason: why it is accepted, refused or not fitted, in words.
-        failure: why its fit failed; empty otherwise.
+        failure: why its fit failed, or why it cannot be what is missing; empty otherwise.
         fitted_instead: label of the similar effect fitted in its place; empty if there is none.
     """
 
