@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import time
 from collections.abc import AsyncGenerator, AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
@@ -21,8 +22,10 @@ from rigwatch.wire.errors import RigwatchError
 
 BETWEEN = 2.0
 """Time between two looks at the rigs [s]."""
-STILL_EVERY = 10.0
+STILL_EVERY = 5.0
 """Time after which a page without news is told that the server is there [s]."""
+OLD_AFTER = 10.0
+"""Time without a look that ends, after which the pages are told that their figures are old [s]."""
 Look = Callable[[], list[RigState]]
 
 
@@ -44,25 +47,30 @@ class FleetPages:
         self._look = look
         self.dashboards = Dashboards()
         self._news = asyncio.Condition()
+        self._seen_at = time.monotonic()
 
     async def follow(self) -> None:
         """Look again and again, and tell the open pages."""
         while True:
             states = await asyncio.to_thread(self._look)
             async with self._news:
-                self.states = states
+                self.states, self._seen_at = states, time.monotonic()
                 self._news.notify_all()
             await asyncio.sleep(BETWEEN)
 
     async def events(self) -> AsyncGenerator[bytes, None]:
-        """The rigs now, and whenever something has changed."""
+        """The rigs now, and whenever something has changed; how old they are if looks stall."""
         told = b""
         while True:
-            content = msgspec.json.encode(
-                {"summary": summary(self.states), "html": as_part(self.states)}
-            )
-            yield STILL_HERE if content == told else event("rigs", content)
-            told = content
+            if (silent := time.monotonic() - self._seen_at) > OLD_AFTER:
+                told = b""  # the next look is told whatever it shows
+                yield event("old", msgspec.json.encode({"seconds": round(silent)}))
+            else:
+                content = msgspec.json.encode(
+                    {"summary": summary(self.states), "html": as_part(self.states)}
+                )
+                yield STILL_HERE if content == told else event("rigs", content)
+                told = content
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(STILL_EVERY), self._news:
                     await self._news.wait()

@@ -36,6 +36,10 @@ events.addEventListener("rigs", (event) => {
   byId("link").className = "";
   document.body.dataset.count = String(Number(document.body.dataset.count ?? 0) + 1);
 });
+events.addEventListener("old", (event) => {
+  say("link", `no look at the rigs for ${JSON.parse(event.data).seconds} s: the figures are old`);
+  byId("link").className = "no";
+});
 events.addEventListener("error", () => {
   say("link", `not connected since ${new Date().toLocaleTimeString()}: the figures are old`);
   byId("link").className = "no";
