@@ -46,6 +46,7 @@ def test_the_result_is_reported_as_json_alone(
     assert damage["interval"][0] <= 5.0 <= damage["interval"][1]
     assert damage["parameters"]["k4_46"]["value"] == pytest.approx(50.0, rel=0.02)
     assert set(told["undamaged"]["noise"]) == {f"x{node}" for node in NODES}
+    assert told["undamaged"]["noise_units"] == {f"x{node}": "m" for node in NODES}
     check_page(page.read_text(encoding="utf-8"))
 
 

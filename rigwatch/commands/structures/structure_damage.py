@@ -144,11 +144,13 @@ def _run_one(arguments: argparse.Namespace, record: Path) -> int:
 
 def _whole(found: "Examination") -> dict[str, Any]:
     base = found.reference
+    outputs = base.model.problem.sweeper.compiled.system.model.outputs
     return {
         "undamaged": {
             "seconds": base.samples * base.model.dt,
             "parameters": _intervals(base.figures),
             "noise": dict(zip(base.model.signals, base.sigma.tolist(), strict=True)),
+            "noise_units": {name: outputs[name].unit for name in base.model.signals},
         },
         "threshold": found.watches[0].threshold,
         "damages": [_plain(damage) for damage in found.damages],
