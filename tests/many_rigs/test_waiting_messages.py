@@ -67,9 +67,9 @@ def test_what_a_process_said_before_its_end_is_not_taken_for_lost(
     alarms, outside = other.listen(ALARMS), rig.bus("outside")
     for run in range(3):
         monitor = connect(rig.config, "monitor", PATIENCE)
+        eventually(lambda: "alive/monitor" in outside.tokens("alive/*"), "its token")
         for seq in range(3):
             monitor.publish(ALARMS, alarm(10 * run + seq))
-        eventually(lambda: "alive/monitor" in outside.tokens("alive/*"), "its token")
         monitor.close()
         eventually(lambda: "alive/monitor" not in outside.tokens("alive/*"), "its end")
     said: list[int] = []
