@@ -18,6 +18,7 @@ from typing import Any, BinaryIO, get_type_hints
 from monitor.alarms.record import AlarmRecord
 from rigwatch.wire.errors import SessionError, reason_of
 from rigwatch.wire.messages import Alarm
+from rigwatch.wire.new_file import sync
 
 _ALARM_TYPES = get_type_hints(Alarm)
 _RECORD_TYPES = get_type_hints(AlarmRecord)
@@ -53,7 +54,7 @@ class AlarmJournal:
             self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
             try:
                 self._end_torn_line()
-                _sync_folder(self.path.parent)
+                sync(self.path.parent)
                 self._newest = _newest(self.path)
             except OSError:
                 os.close(self._file)
@@ -104,7 +105,7 @@ class AlarmJournal:
             raise
         os.close(self._file)
         self._file = file
-        _sync_folder(self.path.parent)
+        sync(self.path.parent)
 
     def _set_aside(self, number: int) -> Path:
         return self.path.with_name(f"{self.path.name}.{number}")
@@ -172,15 +173,6 @@ def _write_all(file: int, waiting: list[bytes]) -> None:
             waiting[0] = b"\n" + line.lstrip(b"\n")
             continue
         del waiting[0]
-
-
-def _sync_folder(folder: Path) -> None:
-    """Sync the folder; a new file survives a power cut only after that."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def _line(record: AlarmRecord) -> bytes:

@@ -15,6 +15,7 @@ import msgspec
 from rigwatch.batch.job import Outcome
 from rigwatch.batch.parquet import lines_of, write_parquet
 from rigwatch.wire.errors import BatchError, reason_of
+from rigwatch.wire.new_file import sync
 from rigwatch.wire.typed_files import JsonError, decoded
 
 PARQUET = ".parquet"
@@ -179,11 +180,7 @@ def journal_of(file: Path) -> Path:
 
 def _replace(temporary: Path, file: Path) -> None:
     """Put a whole file in place, on the disk before anything is removed."""
-    descriptor = os.open(temporary, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    sync(temporary)
     temporary.replace(file)
 
 

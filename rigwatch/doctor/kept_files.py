@@ -23,6 +23,7 @@ from rigwatch.recorder import POSITIONS, load_positions, sessions_of
 from rigwatch.wire.delivery import LARGEST_SEQ
 from rigwatch.wire.errors import ConfigError, RigwatchError
 from rigwatch.wire.host import replace_file
+from rigwatch.wire.new_file import new_file
 from rigwatch.wire.rig_config import RigConfig, load_rig
 from rigwatch.wire.session import SUFFIX, Session, open_session, recover
 from rigwatch.wire.typed_files import loads, read_text
@@ -164,7 +165,5 @@ def _segments(folder: Path, *, is_last: bool) -> Iterator[Kept]:
 
 
 def _close(session: Session) -> None:
-    part = session.path.with_name(f"{session.path.name}.part")
-    part.unlink(missing_ok=True)
-    recover(session, part)
-    part.replace(session.path)
+    with new_file(session.path, replace=True) as part:
+        recover(session, part)

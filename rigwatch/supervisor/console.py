@@ -62,11 +62,7 @@ class Console:
 
     def event(self, event: ProcessEvent) -> None:
         """One event, one line."""
-        if self._json:
-            self._print(json.dumps({"event": event.kind, "t": time.time()} | _fields(event)))
-            return
-        mark = "|" if event.kind == "says" else f"{event.kind}:"
-        self._print(f"{event.process:{NAME_WIDTH}} {mark} {event.text}")
+        self._print(self._text(event))
 
     def changed(self, text: str) -> None:
         """One line about the configuration."""
@@ -74,7 +70,7 @@ class Console:
 
     def remark(self, text: str) -> None:
         """One line of the supervisor itself."""
-        self.event(ProcessEvent("up", "says", text, 0, 0))
+        self.event(_remark(text))
 
     def status(self, supervisor: Supervisor, flow: Flow) -> None:
         """The state of all processes, at intervals."""
@@ -101,13 +97,17 @@ class Console:
 
     def _lost(self, count: int) -> str:
         """The line that says how many could not be printed."""
-        text = f"{count} lines could not be printed"
+        return f"{self._text(_remark(f'{count} lines could not be printed'))}\n"
+
+    def _text(self, event: ProcessEvent) -> str:
         if self._json:
-            return (
-                json.dumps({"event": "says", "t": time.time(), "process": "up", "text": text})
-                + "\n"
-            )
-        return f"{'up':{NAME_WIDTH}} | {text}\n"
+            return json.dumps({"event": event.kind, "t": time.time()} | _fields(event))
+        mark = "|" if event.kind == "says" else f"{event.kind}:"
+        return f"{event.process:{NAME_WIDTH}} {mark} {event.text}"
+
+
+def _remark(text: str) -> ProcessEvent:
+    return ProcessEvent("up", "says", text, 0, 0)
 
 
 def _fields(event: ProcessEvent) -> dict[str, object]:

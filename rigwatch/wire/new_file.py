@@ -69,16 +69,24 @@ def write_new(
         part.write_text(text, encoding="utf-8")
 
 
+def sync(path: Path) -> None:
+    """Return once a file's content, or the names of a folder's files, survive a power cut."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
 def _put(part: Path, target: Path, *, replace: bool) -> None:
-    with part.open("rb") as file:
-        os.fsync(file.fileno())
+    sync(part)
     if not replace:
         _name_anew(part, target)
     else:
         if target.exists():
             shutil.copymode(target, part)
         part.replace(target)
-    _sync_folder(target.parent)
+    sync(target.parent)
 
 
 def _name_anew(part: Path, target: Path) -> None:
@@ -91,14 +99,6 @@ def _name_anew(part: Path, target: Path) -> None:
         if target.exists():
             raise FileExistsError from None
         part.rename(target)
-
-
-def _sync_folder(folder: Path) -> None:
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def _remove_left_behind(target: Path) -> None:
