@@ -31,14 +31,15 @@ ACCURATE = 0.1
 """The same near zero crossings of a state, such as speed, where accuracy needs smaller steps."""
 PASSIVE = 2.0
 """The same for an effect state that is driven by signals and drives nothing itself."""
-SMOOTH = 0.5
-"""The same for a model's own constant rates: the error, a thousandth of a mode that has decayed in
-two steps, is too small to be seen as a jump of a fit's error where the number of steps changes."""
+DECAY_ERROR = 3e-4
+"""Largest error of the decay of a model's own mode between two samples, relative to its start: too
+small to be seen as a jump of a fit's error where the number of steps changes. A Runge-Kutta step
+keeps the linear invariants of a mode and what it drives, so its integral is exact in any case."""
+DECAYING = 1.25
+"""Largest rate times step of a mode that has to decay: states that are coupled as strongly as they
+decay have modes of twice the rate, and those decay, too."""
 INSTANT = 16.0
 """Rate times the time between samples from which a mode is instantaneous for any recording."""
-DECAYING = 1.25
-"""The same as `SMOOTH` beyond that, where it is enough that a mode decays: states that are coupled
-as strongly as they decay have modes of twice the rate, and those decay, too."""
 FINEST = 256
 """Most steps between two samples."""
 FILLED = 1
@@ -92,7 +93,17 @@ def steps_for(
         return 1
     found = np.abs(numpy_function(tuple(system.parameters), rates)(*parameters))
     fastest = float(np.nanmax(found)) * spacing
-    return math.ceil(min(max(min(fastest, INSTANT) / SMOOTH, fastest / DECAYING), FINEST))
+    steps = max(math.ceil(min(fastest / DECAYING, FINEST)), 1)
+    while steps < FINEST and _decay_error(fastest, steps) > DECAY_ERROR:
+        steps += 1
+    return steps
+
+
+def _decay_error(decay: float, steps: int) -> float:
+    """Error of e^-decay in a number of Runge-Kutta steps."""
+    z = decay / steps
+    factor = 1.0 - z + z**2 / 2.0 - z**3 / 6.0 + z**4 / 24.0
+    return abs(float(factor**steps) - math.exp(-decay))
 
 
 def _steep(system: System) -> dict[str, sympy.Expr]:
