@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     talk.add_argument(
         "--line-fault", metavar="NAME[=FRAMES]", help="disturb the serial line for some frames"
     )
-    talk.add_argument("--tell", metavar="LINE", help="any other line, such as 'restart'")
+    talk.add_argument("--tell", metavar="LINE", help="any other command, such as 'restart'")
     record = parser.add_argument_group("record faster than real time")
     record.add_argument("--session", type=Path, metavar="OUT.mcap", help="write a session here")
     record.add_argument(

@@ -10,7 +10,7 @@ from rigwatch.wire.errors import ModelError
 if TYPE_CHECKING:
     from sim_plant.structure import Damage
 
-HELP = "simulate a record, to try the other actions"
+HELP = "simulate a record, to try the other commands on"
 EXAMPLE = """\
   rigwatch structure simulate configs/structures/kabe_antenna.toml antenna.csv
   rigwatch structure simulate kabe.toml damaged.csv --damage 5 springs.k4_46.stiffness=50

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rigwatch.commands.common import print_json, say
 
-HELP = "add an effect to the model of a study, refit, compare; refused if the held-out error rises"
+HELP = "add an effect to the model of a study and refit; refused unless the held-out error falls"
 EXAMPLE = """\
   rigwatch add emps coulomb
   rigwatch add emps offset --port force_sensor
@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("study", type=Path, help="the study's folder")
     parser.add_argument("effect", nargs="?", help="name of the effect")
-    parser.add_argument("--port", help="where it acts, if several places are possible")
+    parser.add_argument("--port", help="port where it acts, if several are possible")
     parser.add_argument(
         "--anyway", action="store_true", help="add it even though the held-out error does not fall"
     )
