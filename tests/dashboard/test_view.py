@@ -57,6 +57,15 @@ def test_a_part_of_it(session: Path, tmp_path: Path, capsys: pytest.CaptureFixtu
     assert json.loads(capsys.readouterr().out)["samples"] == 256
 
 
+def test_a_part_that_begins_after_an_alarm_shows_that_it_stands(
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "later.rrd"
+    main(["view", str(session), "--start", "6", "--end", "7", "--save", str(target), "--json"])
+    drawn = json.loads(capsys.readouterr().out)
+    assert drawn["fault_ns"] == pytest.approx(drawn["start_ns"], abs=0.1e9)
+
+
 def test_a_recording_without_estimates_is_judged_with_a_model(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
