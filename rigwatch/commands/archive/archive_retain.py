@@ -19,9 +19,9 @@ EXAMPLE = """\
   rigwatch archive retain s3://recordings/rigs --rig bench1 --keep-gigabytes 500 --remove"""
 EXIT_FAILED = 1
 _LIMITS = {
-    "keep_days": "age at which sessions go [days]",
+    "keep_days": "age at which sessions are removed [days]",
     "keep_alarm_days": "the same for sessions with alarms [days]",
-    "keep_gigabytes": "size of a rig's sessions above which the oldest go, those with alarms last",
+    "keep_gigabytes": "size of a rig's sessions above which the oldest are removed",
 }
 
 

@@ -45,8 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scheme",
         choices=("auto", "transfer", "equations"),
         default="auto",
-        help="what the rig is watched by: a transfer function and its healthy average, equations "
-        "along the measured motion (no --friction needed), or whichever describes the healthy rig",
+        help="how the rig is monitored: by a transfer function and its healthy average, equations "
+        "along the measured motion (no --friction needed), or by whichever describes it",
     )
     parser.add_argument(
         "--equations",

@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=whole(0), default=0, help="seed of noise and earthquake")
     parser.add_argument(
         "--damage", nargs=2, action="append", metavar=("SECONDS", "PLACE=VALUE"),
-        help="change a number of the file from that time on",
+        help="change a coefficient from that time on",
     )  # fmt: skip
 
 

@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="EFFECT@PORT",
         help="effects that are missing as well: if refused alone, it is added if the whole set"
-        " lowers the held-out error and each effect of it does beside the others",
+        " lowers the held-out error, and each effect of it with the others in the model",
     )
     parser.add_argument(
         "--effect-file",
@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
             if arguments.json:
                 print_json({"step": "effect-file", "effects": names})
             else:
-                print(f"{study.folder}: will be ranked beside the others: {', '.join(names)}")
+                print(f"{study.folder}: will be ranked with the others: {', '.join(names)}")
             return 0
     if arguments.effect is None:
         raise ModelError("add: found no effect, expected its name, or --effect-file")
