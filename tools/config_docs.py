@@ -31,7 +31,7 @@ PAGES: tuple[tuple[str, str, type[Section]], ...] = (
         "People",
         "The file named by `witness.people`: who is notified of alarms, and when nobody is. It "
         "holds passwords, so only its owner should be able to read it. It is read again when it "
-        "changes ([operations](operations.md#when-nobody-looks)).",
+        "changes ([operations](operations.md#notifications-and-heartbeats)).",
         PeopleFile,
     ),
     (
