@@ -165,7 +165,9 @@ class Recorded(Shape, frozen=True, kw_only=True, tag="recorded"):
 
     def _read(self) -> NDArray[np.float64]:
         if bool(self.file) == bool(self.samples):
-            raise ConfigError("scenario", "excitation", "both or neither", "file or samples")
+            raise ConfigError(
+                "scenario", "excitation", "both or neither of file and samples", "one of them"
+            )
         if not self.file:
             return np.array(self.samples)
         try:

@@ -88,7 +88,8 @@ HEAD = """<!-- Printed by `make bench` from benchmarks/results.json. -->
 
 `make bench` runs every benchmark and writes this page; `make bench BENCH="latency replay"` runs
 two of them and keeps the figures of the others. "Published" is W. B. Dunbar's thesis of 1999
-unless a row says otherwise; "MISS" marks a figure that misses its bar.
+unless a row says otherwise; "MISS" marks a figure that misses its bar. Linux and Python 3.11;
+"load" is the machine's load average, other work included.
 """
 
 
@@ -155,9 +156,9 @@ def _section(
 
 
 def _described(machine: Mapping[str, str]) -> str:
-    """The machine in words: "AMD EPYC, 2 cores, Linux, Python 3.11, 2026-11-22"."""
-    words = {"cores": "{} cores", "python": "Python {}", "memory": "{}", "load": "load {}"}
-    return ", ".join(words.get(key, "{}").format(value) for key, value in machine.items())
+    """What matters of the machine, in words: "AMD EPYC, 2 cores, load 2.3, 2026-11-22"."""
+    words = {"processor": "{}", "cores": "{} cores", "load": "load {}", "date": "{}"}
+    return ", ".join(text.format(machine[key]) for key, text in words.items() if key in machine)
 
 
 def write(results: Mapping[str, Measured] | None = None) -> None:

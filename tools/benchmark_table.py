@@ -8,6 +8,8 @@ from dataclasses import dataclass
 HEADINGS = ("", "what", "measured", "bar", "published")
 WIDEST = (4, 44, 34, 26, 26)
 """Widest that a column gets in text [characters]; longer cells are wrapped."""
+ALWAYS = 3
+"""Columns that a page always shows: verdict, what and measured."""
 RUNS = "runs"
 """Bar of a benchmark that ended with an error."""
 
@@ -74,15 +76,16 @@ def as_text(rows: Sequence[Row]) -> str:
 
 
 def as_markdown(rows: Sequence[Row]) -> str:
-    """The table for a page of the documentation."""
-    out = [
-        "| | what | measured | bar | published | note |",
-        "| --- | --- | --- | --- | --- | --- |",
-    ]
-    for row in rows:
-        cells = [cell.replace("|", "\\|").replace("\n", " ") for cell in (*_cells(row), row.note)]
-        out.append("| " + " | ".join(cells) + " |")
-    return "\n".join(out)
+    """The table for a page of the documentation, without columns that no row fills."""
+    headings, cells = (*HEADINGS, "note"), [(*_cells(row), row.note) for row in rows]
+    used = [i for i, _ in enumerate(headings) if i < ALWAYS or any(line[i] for line in cells)]
+    lines = [headings, ("---",) * len(headings), *cells]
+    return "\n".join(_markdown_line([line[i] for i in used]) for line in lines)
+
+
+def _markdown_line(cells: Sequence[str]) -> str:
+    plain = (cell.strip().replace("|", "\\|").replace("\n", " ") for cell in cells)
+    return f"| {' | '.join(plain)} |"
 
 
 def _cells(row: Row) -> tuple[str, ...]:

@@ -31,7 +31,7 @@ PAGES: tuple[tuple[str, str, type[Section]], ...] = (
         "People",
         "The file named by `witness.people`: who is notified of alarms, and when nobody is. It "
         "holds passwords, so only its owner should be able to read it. It is read again when it "
-        "changes ([operations](operations.md#when-nobody-looks)).",
+        "changes ([operations](operations.md#notifications-and-heartbeats)).",
         PeopleFile,
     ),
     (
@@ -64,16 +64,27 @@ def undocumented() -> list[str]:
     return found
 
 
-def sections(root: type[Section], level: int = 2) -> Iterator[str]:
+def sections(
+    root: type[Section], level: int = 2, printed: set[type[Section]] | None = None
+) -> Iterator[str]:
     """The struct and all that its fields may hold: a heading, a text and a table each.
 
     Args:
         root: of a file.
         level: of the headings.
+        printed: structs that the page has already, which are left out; the new ones are added.
     """
+    printed = set() if printed is None else printed
     for kind in _structs(root):
+        if kind in printed:
+            continue
+        printed.add(kind)
         first, _, rest = (kind.__doc__ or "").partition("\n")
-        yield f"{'#' * level} {first.strip().rstrip('.')}\n"
+        summary = first.strip().rstrip(".")
+        if kind is root or " — " in summary:
+            yield f"{'#' * level} {summary}\n"
+        else:
+            yield f"{'#' * level} {kind.__name__}\n\n{summary}.\n"
         yield from _text(rest)
         yield "| key | type | default | |"
         yield "| --- | --- | --- | --- |"
@@ -142,10 +153,10 @@ def _description(kind: Any) -> str:
 
 _NAMES: dict[type, str] = {
     inspect.StrType: "text",
-    inspect.BoolType: "true or false",
-    inspect.IntType: "whole number",
+    inspect.BoolType: "boolean",
+    inspect.IntType: "integer",
     inspect.FloatType: "number",
-    inspect.DateTimeType: "date and time",
+    inspect.DateTimeType: "date-time",
     inspect.TimeType: "time",
     inspect.NoneType: "",
 }
@@ -155,7 +166,8 @@ def _type_name(kind: Any) -> str:
     match _plain(kind):
         case inspect.StructType(cls=struct):
             first = (struct.__doc__ or "").partition("\n")[0]
-            name = first.partition(" — ")[0] if " — " in first else struct.__name__
+            plain = struct.__name__
+            name = first.partition(" — ")[0] if " — " in first else f"[{plain}](#{plain.lower()})"
         case inspect.LiteralType(values=values):
             name = " / ".join(f"`{value}`" for value in values)
         case inspect.UnionType(types=options):
@@ -166,8 +178,8 @@ def _type_name(kind: Any) -> str:
             name = f"{len(items)} × {_type_name(items[0])}"
         case inspect.DictType(value_type=value):
             name = f"table of {_type_name(value)}"
-        case plain:
-            name = _NAMES.get(type(plain), type(plain).__name__) + _limits(plain)
+        case other:
+            name = _NAMES.get(type(other), type(other).__name__) + _limits(other)
     return name
 
 

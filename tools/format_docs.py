@@ -77,12 +77,13 @@ FILES: tuple[tuple[str, str, type[Section]], ...] = (
 
 def page() -> str:
     """The whole page."""
-    return HEAD + "\n".join(part for file in FILES for part in _file(*file))
+    printed: set[type[Section]] = set()
+    return HEAD + "\n".join(part for file in FILES for part in _file(*file, printed))
 
 
-def _file(title: str, text: str, kind: type[Section]) -> Iterator[str]:
+def _file(title: str, text: str, kind: type[Section], printed: set[type[Section]]) -> Iterator[str]:
     yield f"\n## {title}\n\n{text}\n"
-    yield from sections(kind, 3)
+    yield from sections(kind, 3, printed)
 
 
 def main() -> int:

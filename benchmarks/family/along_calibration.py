@@ -40,7 +40,7 @@ HELD = 0.9
 
 @dataclass(frozen=True)
 class Case:
-    """A recording of a drawn rig, the base model, and whether the study is told the mass."""
+    """A recording of a drawn rig, the base model, and whether the study knows the mass."""
 
     member: str
     seed: int
@@ -71,7 +71,7 @@ class Outcome:
 
     @property
     def judges(self) -> bool:
-        """Whether the rig's equations chose nothing."""
+        """Whether the rig's equations are held out from every choice."""
         return FLAVOURS[self.case.member].group == "judged"
 
 
@@ -128,10 +128,10 @@ def _strengths(model: str, outcomes: Sequence[Outcome]) -> Iterator[Row]:
     found = [o.strength for o in outcomes if o.strength is not None]
     if not found:
         return
-    told = "told" if outcomes[0].case.weighed else "not told"
+    given = "given" if outcomes[0].case.weighed else "not given"
     close = sum(abs(value / true - 1) <= CLOSE for _, true, value, _, _ in found)
     inside = sum(low <= true <= high for _, true, _, low, high in found)
-    yield Row(f"strength within {CLOSE:.0%} of truth, and in its interval, {model}, mass {told}",
+    yield Row(f"strength within {CLOSE:.0%} of truth, and in its interval, {model}, mass {given}",
               f"{close} and {inside} of {len(found)}", "all and 90 %", "", "",
               close == len(found) and inside >= HELD * len(found))  # fmt: skip
 

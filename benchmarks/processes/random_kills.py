@@ -99,24 +99,25 @@ def run(quick: bool) -> list[Row]:
         if kept := os.environ.get("RIGWATCH_KILL_FOLDER"):
             shutil.copytree(rig.folder, kept, ignore=shutil.ignore_patterns("serial-line"))
         accounts = accounts_of(rig.folder)
-    return [_row(one, done, minutes) for one in accounts] + [_alive(left, done)]
+    return [_alive(left, done, minutes), *map(_row, accounts)]
 
 
-def _row(account: Account, done: Disturbance, minutes: float) -> Row:
+def _alive(left: list[str], done: Disturbance, minutes: float) -> Row:
+    what = f"{done.count} random kills and hangs in {minutes:g} min: processes at the end"
+    text = "all run" if not left else f"{', '.join(left)} not"
+    refused = f"{done.commands} commands of an operator, {done.refused} answered with a refusal"
+    return Row(what, text, "all run", "", f"{done}; {refused}", passed=not left)
+
+
+def _row(account: Account) -> Row:
     return Row(
-        f"{done.count} random kills and hangs in {minutes:g} min: {account.what}",
+        f"the same: {account.what}",
         f"{account.missing} silently missing",
         "0",
         "",
-        f"{account.note}; {done}",
+        account.note,
         passed=account.missing == 0 and account.total > 0,
     )
-
-
-def _alive(left: list[str], done: Disturbance) -> Row:
-    text = "all run" if not left else f"{', '.join(left)} not"
-    note = f"{done.commands} commands of an operator, {done.refused} answered with a refusal"
-    return Row("the same: processes at the end", text, "all run", "", note, passed=not left)
 
 
 def disturbed(rig: LiveRig, seconds: float) -> tuple[Disturbance, list[str]]:

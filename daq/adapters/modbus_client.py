@@ -137,7 +137,7 @@ def tcp(section: ModbusSection, channels: tuple[ChannelSection, ...]) -> ModbusA
             section.host, port=section.port, timeout=section.timeout, retries=0
         )
         if not client.connect():
-            raise DeviceError(f"{where}: nobody answers")
+            raise DeviceError(f"{where}: no answer")
         return client
 
     registers = PymodbusRegisters(make, section.unit, where)

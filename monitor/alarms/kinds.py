@@ -75,82 +75,82 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "link",
         "critical",
-        "the device is gone: cable, power or port",
-        "Check the cable and the device's power. The line reopens by "
-        "itself; the lost samples are counted.",
+        "the connection to the device is lost (cable, power or port)",
+        "Check the cable and the device's power. The connection is restored by itself; lost "
+        "samples are counted.",
         _AT_ONCE,
     ),
     AlarmKind(
         "stale",
         "critical",
         "no samples arrive although the line is open",
-        "Check that device and daq are running (rigwatch doctor). Do not trust the last values.",
+        "Check that device and daq are running (`rigwatch doctor CONFIG`). Do not trust the last "
+        "values.",
         _AT_ONCE,
     ),
     AlarmKind(
         "duplicate_source",
         "critical",
-        "a second publisher sends samples of this device; those of the first are used",
-        "Find and stop the second daq process, or give it a rig id of its own.",
+        "a second process sends samples of this device; those of the first are used",
+        "Find and stop it; a second daq needs a rig id of its own.",
         _AT_ONCE,
     ),
     AlarmKind(
         "loss",
         "error",
         "samples were lost and could not be recovered",
-        "See the gaps in the recording. Check the load of the "
-        "machine and the line's error counters.",
+        "The recording shows the gaps. Check the machine's load and the line's error counters.",
         _AT_ONCE,
     ),
     AlarmKind(
         "gap",
         "warning",
-        "samples are missing, the estimation window was restarted",
-        "Wait one window for new estimates. If it repeats, check the line and the machine's load.",
+        "samples are missing; the estimates start again",
+        "New estimates follow in seconds. If it repeats, check the line and the machine's load.",
         _PASSING,
     ),
     AlarmKind(
         "line_noise",
         "error",
-        "more than 1 % of the bytes from the device belong to no frame",
-        "Check the baud rate, the cable's shield and its length; see crc_errors and skipped_bytes "
-        "in the health message.",
+        "more than 1 % of the bytes from the device are not valid data",
+        "Check the cable, its shield and length, and the baud rate. `crc_errors` and "
+        "`skipped_bytes` count the errors.",
         _AT_ONCE,
     ),
     AlarmKind(
         "slow_device",
         "warning",
-        "the device delivers less than 90 % of its samples' nominal rate",
-        "Check the device's load and the line's speed; compare rate_hz with rig.sample_rate.",
+        "the device delivers less than 90 % of its nominal sample rate",
+        "Check the device's load and the line's speed, and that rig.sample_rate is right.",
         _PASSING,
     ),
     AlarmKind(
         "estimates_missing",
         "critical",
-        "samples arrive and nothing is estimated from them",
-        "See the monitor's health message for the reason. The rig is not being watched.",
+        "samples arrive, but the monitor computes nothing from them",
+        "The rig is not being monitored. The monitor's health message gives the reason.",
         _AT_ONCE,
     ),
     AlarmKind(
         "clock_drift",
         "warning",
-        "the device's clock runs at another rate than this machine's",
-        "Compare rate_hz in the health message with the nominal "
-        "rate; check the device's oscillator.",
+        "the device's clock runs faster or slower than this machine's",
+        "Compare `rate_hz` in the health message with the nominal rate; check the device's "
+        "oscillator.",
         _PASSING,
     ),
     AlarmKind(
         "clock_wrong",
         "error",
-        "the device's clock is off by more than half a per cent; frequencies and rates are wrong",
-        "Do not trust frequencies, velocities and accelerations. Check the device's oscillator and "
-        "rig.sample_rate.",
+        "the device's clock is off by more than 0.5 %, so frequencies and rates are wrong",
+        "Do not trust frequencies, velocities and accelerations. Check the device's oscillator "
+        "and rig.sample_rate.",
         _AT_ONCE,
     ),
     AlarmKind(
         "disk",
         "error",
-        "the disk is full or nearly so; recording or journal may stop",
+        "the disk is full or nearly full; recording and alarm journal may stop",
         "Free space or mount another disk. Monitoring continues; what is not recorded is counted.",
         _AT_ONCE,
     ),
@@ -165,30 +165,30 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "recording_stopped",
         "critical",
         "nothing is being recorded",
-        "Check the disk and the recorder's process. Monitoring continues; the recorder fetches "
-        "what the rings still hold when it returns.",
+        "Check the disk and the recorder's process. Monitoring continues; a recorder that returns "
+        "fetches recent samples.",
         _AT_ONCE,
     ),
     AlarmKind(
         "monitor_reset",
         "error",
-        "a filter diverged (NaN or out of range) and was reset",
-        "See the event log. Estimates are valid again after one window; commission again if it "
-        "repeats.",
+        "a filter of the monitor diverged and was reset",
+        "Estimates are valid again within seconds. If it repeats, see the event log and "
+        "commission again.",
         _AT_ONCE,
     ),
     # The wiring, checked over the first seconds of motion.
     AlarmKind(
         "wiring_sign",
         "critical",
-        "position and acceleration have opposite signs; nothing is judged",
+        "position and acceleration have opposite signs; the rig is not monitored",
         "Reverse the sensor or its gain in the configuration, then restart the monitor.",
         _AT_ONCE,
     ),
     AlarmKind(
         "wiring_scale",
         "critical",
-        "acceleration and position disagree about the size of the motion; nothing is judged",
+        "acceleration and position disagree about the size of the motion; the rig is not monitored",
         "Check unit, gain and range of both channels (mm or m, g or m/s^2, range of the "
         "amplifier), then restart the monitor.",
         _AT_ONCE,
@@ -196,7 +196,7 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "wiring_swapped",
         "critical",
-        "position and acceleration do not show the same motion; nothing is judged",
+        "position and acceleration do not show the same motion; the rig is not monitored",
         "Look for swapped channels, a reversed sensor behind a filter, or a sensor on another "
         "part, then restart the monitor.",
         _AT_ONCE,
@@ -205,71 +205,71 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "sensor_non_finite",
         "error",
-        "the {channel} channel delivers no number",
-        "Check the sensor, its supply and its calibration. The "
-        "channel is kept out of every estimate.",
+        "the {channel} channel delivers no valid number",
+        "Check the sensor, its supply and its calibration. The channel is kept out of all "
+        "estimates.",
         _AT_ONCE,
     ),
     AlarmKind(
         "sensor_saturated",
         "warning",
-        "the {channel} signal stands at its rail or outside the sensor's range",
-        "Lower the excitation or choose another range. Saturated "
-        "samples are kept out of the estimates.",
+        "the {channel} signal is at its limit or outside the sensor's range",
+        "Lower the excitation or choose another range. Saturated samples are kept out of the "
+        "estimates.",
         _AT_ONCE,
     ),
     AlarmKind(
         "sensor_clipped",
         "error",
-        "the {channel} signal is cut off at one value inside the sensor's range",
-        "Check the sensor's amplifier, its supply and its range. What lies beyond the "
-        "cut is lost, so do not trust estimates that need this channel.",
+        "the {channel} signal is clipped inside the sensor's range",
+        "Check the sensor's amplifier, supply and range. Do not trust estimates that need this "
+        "channel.",
         _AT_ONCE,
     ),
     AlarmKind(
         "sensor_jumped",
         "error",
-        "the {channel} signal has jumped faster than any motion of the rig",
-        "Check the sensor's mounting, wiring and zero, and whether it has been touched. Dry "
-        "friction is not named from the samples after a jump.",
+        "the {channel} signal has jumped faster than the rig can move",
+        "Check the sensor's mounting, wiring and zero, and whether it was touched. Dry friction "
+        "is not named for a second after a jump.",
         _AT_ONCE,
     ),
     AlarmKind(
         "sensor_stuck",
         "error",
-        "the {channel} reading has not changed for longer than a working sensor's noise allows",
-        "Check the sensor's wiring and supply; move the rig by hand and watch the channel. If it "
-        "is a set value that may be held, set its stuck_after to 0.",
+        "the {channel} reading does not change, not even by noise",
+        "Check the sensor's wiring and supply; move the rig by hand and watch the channel. For a "
+        "set value that may be held, set stuck_after = 0.",
         _AT_ONCE,
     ),
     AlarmKind(
         "sensor_stale",
         "error",
         "the {channel} channel repeats an old value",
-        "Check the device's sampling of this channel.",
+        "Check how the device samples this channel.",
         _SENSOR,
     ),
     AlarmKind(
         "sensor_spike",
         "warning",
-        "three times within a second the {channel} signal has changed faster than the sensor can",
-        "Look for a loose contact or electrical disturbance near the sensor's cable.",
+        "the {channel} signal changed three times within a second faster than the sensor can",
+        "Look for a loose contact or electrical interference near the sensor's cable.",
         _AT_ONCE,
     ),
     AlarmKind(
         "sensor_invalid",
         "error",
         "a channel that the estimates need has been invalid for too long",
-        "See which sensor alarm stands beside this one. Estimates resume once the channel is "
-        "valid.",
+        "The sensor's own alarm names the channel. Estimates resume once it is valid.",
         _AT_ONCE,
     ),
     # The rig itself.
     AlarmKind(
         "departure",
         "error",
-        "the rig no longer behaves as its healthy model; the kind of fault is being worked out",
-        "Keep the excitation running: naming the fault takes about one window of faulty samples.",
+        "the rig no longer behaves like its healthy model; the fault is being identified",
+        "Keep the excitation running: identification takes a few periods of the motion. Be ready "
+        "to stop.",
         _LASTING,
     ),
     AlarmKind(
@@ -284,8 +284,9 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "stiction",
         "error",
-        "stiction: the mass sticks and breaks away",
-        "Stop now. The bearing touches or a part is jammed; turn on the air before moving again.",
+        "stiction: the mass sticks and breaks away in jerks",
+        "Stop now. The bearing touches or a part is jammed; restore the air supply before moving "
+        "again.",
         _LASTING,
         refines="departure",
         safety=True,
@@ -293,9 +294,9 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "other_fault",
         "error",
-        "the rig has changed, and dry friction does not explain how",
-        "Check sensors (gain, offset), supply pressure, valve and "
-        "leaks; compare with a healthy recording.",
+        "the rig has changed in a way that dry friction does not explain",
+        "Check sensors (gain, offset), supply pressure, valve and leaks; compare with a healthy "
+        "recording.",
         _LASTING,
         refines="departure",
     ),
@@ -303,22 +304,22 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "parity_arma",
         "warning",
-        "output and model differ: the ARMA parity residual exceeds its adaptive threshold",
+        "the position differs from the model's (ARMA parity residual above its threshold)",
         "Compare with the friction estimates; a constant residual points to a sensor offset.",
         _LASTING,
     ),
     AlarmKind(
         "parity_ma",
         "warning",
-        "the model's difference equation no longer holds: the MA parity residual exceeds its "
-        "threshold",
+        "the position breaks the model's difference equation (MA parity residual above its "
+        "threshold)",
         "Compare with the friction estimates; short bursts point to impacts or spikes.",
         _LASTING,
     ),
     AlarmKind(
         "unknown_input",
         "warning",
-        "the measured position carries a bias that the model does not explain",
+        "the measured position has a bias that the model does not explain",
         "Compare with the friction estimates; check the position sensor's zero and mounting.",
         _LASTING,
     ),
@@ -327,15 +328,14 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "excitation_changed",
         "warning",
         "the excitation differs from that of the healthy reference",
-        "Return to the known excitation, or record a healthy stretch with the new one and arm "
-        "again.",
+        "Return to the known excitation, or commission with a healthy recording of the new one.",
         _PASSING,
     ),
     AlarmKind(
         "reference_learnt",
         "info",
-        "the model file holds no healthy recording of this excitation: the reference was learnt "
-        "from this run, and a fault already present then counts as healthy",
+        "no healthy recording of this excitation: the start of this run counts as healthy, with "
+        "any fault already present",
         "Make sure that the rig was healthy at the start, or commission with a healthy recording "
         "of this excitation.",
         _REMARK,
@@ -343,14 +343,15 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "not_armed",
         "info",
-        "the model's hidden states have not settled yet; nothing is judged",
-        "Wait for two seconds of samples without a gap.",
+        "the monitor is settling after a start, a gap or a change of the drive; nothing is judged "
+        "yet",
+        "Wait two seconds. If it stays, look for alarms about samples.",
         _REMARK,
     ),
     AlarmKind(
         "not_judged",
         "warning",
-        "the motion is beyond the range that the model was fitted to; nothing is judged",
+        "the motion is outside the range that commissioning covered; the rig is not judged",
         "Return to a motion that commissioning covered, or commission again with a healthy "
         "recording of this one.",
         _PASSING,
@@ -358,21 +359,21 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "not_observable",
         "info",
-        "too little motion to estimate friction; estimates are frozen",
-        "Nothing is wrong. Move the rig to watch its friction.",
+        "too little motion to estimate friction; the estimates are frozen",
+        "Nothing is wrong. Move the rig to monitor its friction.",
         _REMARK,
     ),
     AlarmKind(
         "ill_conditioned",
         "info",
-        "this motion cannot tell the two friction terms apart; estimates are held",
+        "this motion cannot distinguish dry from viscous friction; the estimates are frozen",
         "Nothing is wrong. Vary the amplitude or the frequency of the excitation.",
         _REMARK,
     ),
     AlarmKind(
         ALARM_FLOOD,
         "error",
-        "more alarms than a person can follow; they are grouped, critical ones excepted",
+        "more than ten alarms in ten minutes; further ones are grouped, except critical ones",
         "Look at the first-out alarm: it is probably the cause of the others.",
         _PASSING,
     ),

@@ -224,7 +224,9 @@ def check_model(model: RigModel, path: Path | str) -> None:
     if model.noise.repeat and len(model.noise.repeat) != wanted:
         raise ConfigError(path, "noise.repeat", f"{len(model.noise.repeat)}", f"{wanted} or none")
     if (model.band is None) != isinstance(model.plant, TransferPlant):
-        raise ConfigError(path, "band", "it missing or in excess", "a band with an inertia only")
+        found = "no such section" if model.band is None else "this section"
+        expected = "a section [band] for an inertia, and for no other plant"
+        raise ConfigError(path, "band", found, expected)
     if isinstance(model.plant, TransferPlant) and not model.plant.function().is_stable:
         raise ConfigError(path, "plant.a", "poles outside the unit circle", "a stable model")
     if not model.friction.function().is_stable:
@@ -233,7 +235,7 @@ def check_model(model: RigModel, path: Path | str) -> None:
         by_direction = model.promoted.coulomb_by_direction, model.promoted.viscous_by_direction
         if any(by_direction):
             found = "friction that differs by direction"
-            raise ConfigError(path, "promoted", found, "it with an inertia only")
+            raise ConfigError(path, "promoted", found, "such friction for an inertia only")
 
 
 def _check_references(model: RigModel, path: Path | str) -> None:
@@ -247,13 +249,14 @@ def _check_references(model: RigModel, path: Path | str) -> None:
 def _check_equations(model: RigModel, path: Path | str) -> None:
     for key in ("remainder", "motion_range", "healthy"):
         if getattr(model, key) is None:
-            raise ConfigError(path, key, "nothing", "a section beside a plant of equations")
+            raise ConfigError(path, key, "no such section", "one for a plant of equations")
     assert isinstance(model.plant, EquationsPlant)
     if len(model.plant.names) != len(model.plant.values):
         found = f"{len(model.plant.names)} names, {len(model.plant.values)} values"
         raise ConfigError(path, "plant.values", found, "one value a name")
     if model.promoted or model.band:
-        raise ConfigError(path, "promoted", "it, or a band", "neither with a plant of equations")
+        key = "promoted" if model.promoted else "band"
+        raise ConfigError(path, key, "this section", "none for a plant of equations")
 
 
 _COLUMNS = ("voltage", "position", "acceleration", "modelled")

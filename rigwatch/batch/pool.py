@@ -79,7 +79,7 @@ class Pool:
             return
         if self._make is None:
             kind = type(self.executor).__name__
-            raise BatchError(f"{kind} is broken, expected a function that makes it anew")
+            raise BatchError(f"{kind} is broken; pass a function that makes a new one")
         if self._own:
             self.executor.shutdown(wait=False, cancel_futures=True)
         self.executor, self._own = self._made(), True

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeGuard
 
 import rerun as rr
 from rerun.experimental import ViewerClient
@@ -31,8 +32,8 @@ class Drawn:
     Attributes:
         samples: number of samples.
         start_ns, end_ns: first and last time [ns]; 0 if nothing was drawn.
-        fault_ns: time of the first alarm that names a fault, else of the first fault [ns]; 0 if
-            there was none.
+        fault_ns: time of the first alarm raised here that names a fault, else of the first fault
+            [ns]; 0 if there was none.
     """
 
     samples: int
@@ -81,7 +82,8 @@ def draw(
     faults: dict[str, int] = {}
     for message in messages:
         dashboard.show(message)
-        if isinstance(message, Alarm) and is_active(message) and message.severity != "info":
+        # What stands before the first sample was raised before this part.
+        if facts.samples and _is_fault(message):
             faults.setdefault(message.name, message.t_ns)
         if facts.samples - flushed >= _FLUSH_AFTER:
             flushed = facts.samples
@@ -91,6 +93,10 @@ def draw(
     stream.flush(timeout_sec=_FLUSH_TIMEOUT)
     stream.disconnect()
     return Drawn(facts.samples, dashboard.began_ns, dashboard.now_ns, _most_telling(faults))
+
+
+def _is_fault(message: Message) -> TypeGuard[Alarm]:
+    return isinstance(message, Alarm) and is_active(message) and message.severity != "info"
 
 
 def _most_telling(faults: dict[str, int]) -> int:

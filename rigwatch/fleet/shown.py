@@ -40,7 +40,7 @@ def summary(states: Sequence[RigState]) -> str:
     """How many rigs there are, and how many need somebody."""
     unwell = sum(state.rank > 0 for state in states)
     alarms = sum(len(state.alarms) for state in states)
-    return f"{len(states)} rigs: {unwell} not well, {alarms} alarms"
+    return f"{len(states)} rigs: {unwell} need attention, {alarms} alarms"
 
 
 def as_page(states: Sequence[RigState], every_s: float = 0.0) -> str:

@@ -46,7 +46,7 @@ def _routers(rigs: Rigs) -> list[tuple[Path, RigConfig]]:
         other, first = found.setdefault(config.bus.listen, (path, config))
         if other is not path and (config.bus.security.keys or first.bus.security.keys):
             expected = "one of its own: a router with keys serves one rig"
-            raise ConfigError(path, "bus.listen", f"that of {other}", expected)
+            raise ConfigError(path, "bus.listen", f"the address of {other}", expected)
     return list(found.values())
 
 

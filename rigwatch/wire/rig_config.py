@@ -79,7 +79,7 @@ class BusSection(Section, frozen=True):
             "[MB]",
         ),
     ] = 32.0
-    security: Annotated[SecuritySection, Meta(description="who may speak")] = field(
+    security: Annotated[SecuritySection, Meta(description="access to the bus")] = field(
         default_factory=SecuritySection
     )
 
@@ -170,8 +170,8 @@ class DaqSection(Section, frozen=True):
     stale_after: Annotated[
         Annotated[float, Meta(gt=0)] | None,
         Meta(
-            description="silence that means stale [s], at least two periods or polls; without it "
-            "three of them, and no less than 0.1"
+            description="time without samples that raises `stale` [s], at least two periods or "
+            "polls; by default three of them, and no less than 0.1"
         ),
     ] = None
 
@@ -256,8 +256,8 @@ class WitnessSection(Section, frozen=True):
     stale_after: Annotated[
         Annotated[float, Meta(gt=0)] | None,
         Meta(
-            description="time without estimates that is an alarm [s], at least two periods or "
-            "polls of the device; without it three of them, and no less than 1"
+            description="time without estimates that raises `monitor_stale` [s], at least two "
+            "periods or polls of the device; by default three of them, and no less than 1"
         ),
     ] = None
     heartbeat_file: Annotated[
@@ -321,8 +321,8 @@ class RigConfig(Section, frozen=True):
     base: Annotated[
         str,
         Meta(
-            description="a file whose keys hold where this one has none, relative to this file; "
-            "tables are merged key by key, channels by name"
+            description="file with common settings, relative to this file, which takes "
+            "precedence key by key, channels by name"
         ),
     ] = ""
     bus: Annotated[BusSection, Meta(description="the bus")] = field(default_factory=BusSection)

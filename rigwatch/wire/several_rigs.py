@@ -60,4 +60,4 @@ def check_own(key: str, values: Iterable[tuple[Path, str]]) -> None:
     for path, value in values:
         other = seen.setdefault(value, path)
         if other is not path:
-            raise ConfigError(path, key, f"that of {other}", "one of its own")
+            raise ConfigError(path, key, f"the same as in {other}", "a value of its own")

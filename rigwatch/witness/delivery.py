@@ -183,7 +183,7 @@ def text_of(notice: Notice, rig: str) -> tuple[str, str]:
     alarm = notice.alarm
     again = f", notice {notice.times + 1}" if notice.times else ""
     lasting = f", unacknowledged for {notice.minutes:.0f} min" if notice.minutes >= 1 else ""
-    over = ", over" if alarm.state == "cleared_unacknowledged" else ""
+    cleared = ", cleared" if alarm.state == "cleared_unacknowledged" else ""
     when = datetime.fromtimestamp(alarm.t_ns / 1e9, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
-    title = f"[{rig}] {alarm.severity}: {alarm.name}{over}{lasting}{again}"
+    title = f"[{rig}] {alarm.severity}: {alarm.name}{cleared}{lasting}{again}"
     return title, f"{alarm.cause}\n\n{alarm.guidance}\n\n{when}"

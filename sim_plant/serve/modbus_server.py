@@ -77,7 +77,7 @@ class ModbusServer:
         try:
             await server.serve_forever(background=True)
         except (RuntimeError, OSError) as error:
-            raise DeviceError(f"{where}: cannot be listened on") from error
+            raise DeviceError(f"{where}: cannot listen here: {error}") from error
         self._heartbeat.ready(f"Modbus at {where}")
         taken = 1
         while not stop.is_set():

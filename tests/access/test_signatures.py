@@ -47,7 +47,7 @@ def test_a_signed_command_is_accepted_once(keys: Path, verifier: Verifier) -> No
 @pytest.mark.parametrize("field", range(len(SAID)))
 def test_a_changed_field_breaks_the_signature(keys: Path, verifier: Verifier, field: int) -> None:
     changed = (*SAID[:field], SAID[field] + "x", *SAID[field + 1 :])
-    with pytest.raises(KeysError, match="signature does not fit"):
+    with pytest.raises(KeysError, match="signature does not match"):
         verifier.check("ann", proof_of(verifier, keys), changed)
 
 
@@ -60,10 +60,10 @@ def test_fields_cannot_be_moved_into_each_other() -> None:
 @pytest.mark.parametrize(
     ("change", "why"),
     [
-        (lambda p: replace_in(p, nonce="0" * 32), "signature does not fit"),
-        (lambda p: replace_in(p, t_ns=1), "signature does not fit"),
-        (lambda p: replace_in(p, runs=(*read_proof(p).runs, "x")), "signature does not fit"),
-        (lambda p: replace_in(p, signature="zz"), "signature does not fit"),
+        (lambda p: replace_in(p, nonce="0" * 32), "signature does not match"),
+        (lambda p: replace_in(p, t_ns=1), "signature does not match"),
+        (lambda p: replace_in(p, runs=(*read_proof(p).runs, "x")), "signature does not match"),
+        (lambda p: replace_in(p, signature="zz"), "signature does not match"),
         (lambda p: replace_in(p, certificate="none"), "certificate cannot be read"),
         (lambda _: "", "not signed"),
         (lambda _: "[" * 5000, "proof cannot be read"),
@@ -85,7 +85,7 @@ def replace_in(text: str, **fields: object) -> str:
 def test_another_user_rig_run_or_role_is_refused(keys: Path, verifier: Verifier) -> None:
     with pytest.raises(KeysError, match="it is signed by bob, expected ann"):
         verifier.check("ann", proof_of(verifier, keys, "bob"), SAID)
-    with pytest.raises(KeysError, match="signature does not fit"):
+    with pytest.raises(KeysError, match="signature does not match"):
         verifier.check("ann", proof_of(verifier, keys, rig="other"), SAID)
     with pytest.raises(KeysError, match="another run"):
         verifier.check("ann", proof_of(Verifier(keys, "bench"), keys), SAID)

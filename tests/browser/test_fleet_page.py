@@ -85,7 +85,7 @@ def test_the_worst_rig_moves_up_by_itself_and_the_focus_stays(
     assert page.run("return document.activeElement.id") == "to-left"
     assert "dry_friction" in page.text("#alarms")
     assert "<rubs> stop & look" in page.text("#rig-right")
-    assert page.text("#summary") == "3 rigs: 2 not well, 1 alarms"
+    assert page.text("#summary") == "3 rigs: 2 need attention, 1 alarms"
     page.click("#alarm-right-dry_friction")
     assert page.run("return location.hash") == "#rig-right"
     rigs["right"].alarms = []

@@ -8,8 +8,10 @@ import pytest
 from PIL import Image
 
 from rigwatch.commands import main
+from rigwatch.commands.common.watched import messages_of
 from rigwatch.dashboard.board import palette
-from rigwatch.wire.session import SessionWriter, run_info
+from rigwatch.wire.messages import Alarm
+from rigwatch.wire.session import SessionWriter, open_session, run_info
 from tests.dashboard.rig_messages import Rig
 
 RECORDINGS = Path(__file__).parents[1] / "verify"
@@ -55,6 +57,21 @@ def test_a_part_of_it(session: Path, tmp_path: Path, capsys: pytest.CaptureFixtu
     target = tmp_path / "part.rrd"
     main(["view", str(session), "--start", "1", "--end", "2", "--save", str(target), "--json"])
     assert json.loads(capsys.readouterr().out)["samples"] == 256
+
+
+def test_a_part_that_begins_after_an_alarm_shows_that_it_stands(
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    opened = open_session(session)
+    first = next(opened.samples()).t_ns[0]
+    span = (int(first) + 6_000_000_000, int(first) + 7_000_000_000)
+    said = next(messages_of(opened, span, None))
+    assert isinstance(said, Alarm)
+    assert (said.name, said.state, said.t_ns) == ("dry_friction", "unacknowledged", span[0])
+    # The cursor stays at the end, as nothing is raised within the part.
+    view = ["view", str(session), "--start", "6", "--end", "7", "--save", str(tmp_path / "x.rrd")]
+    assert main([*view, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["fault_ns"] == 0
 
 
 def test_a_recording_without_estimates_is_judged_with_a_model(

@@ -61,7 +61,11 @@ def headline(facts: Facts) -> str:
         (moving(alarm("dry_friction")), "dry_friction", "# DRY FRICTION"),
         (moving(alarm("dry_friction", "acknowledged")), "dry_friction", "# DRY FRICTION"),
         (moving(alarm("dry_friction", "normal")), "healthy", "# Healthy"),
-        (moving(alarm("dry_friction", "cleared_unacknowledged")), "over", "# Over: dry friction"),
+        (
+            moving(alarm("dry_friction", "cleared_unacknowledged")),
+            "over",
+            "# Cleared: dry friction",
+        ),
         (moving(alarm("link", "cleared_unacknowledged")), "healthy", "# Healthy"),
         (moving(alarm("sensor_stuck.position")), "fault", "# SENSOR STUCK, POSITION"),
         (moving(alarm("not_observable", "acknowledged", "info")), "no_verdict", "# No verdict now"),
@@ -116,7 +120,7 @@ def test_age_of_the_picture() -> None:
     newest = int(RIG.t_ns(np.array(255)))
     facts.tell_time(newest + 40_000_000)
     assert facts.age.now == pytest.approx(40.0)
-    assert "| age of the picture [ms] | 40 | 40 | 40 |" in status(facts)
+    assert "| age of newest sample [ms] | 40 | 40 | 40 |" in status(facts)
 
 
 def test_status_shows_what_people_ask_for_first() -> None:
@@ -137,7 +141,7 @@ def test_status_passes_on_complaints() -> None:
     facts.health["daq"] = replace(RIG.health(10), state="slow", text="200 samples a second")
     facts.skipped = 3
     assert "* daq: slow, 200 samples a second" in status(facts)
-    assert "left out 3 messages" in status(facts)
+    assert "skipped 3 messages" in status(facts)
 
 
 def test_log_line_has_guidance_value_and_sample() -> None:
@@ -150,7 +154,7 @@ def test_log_line_has_guidance_value_and_sample() -> None:
 
 def test_log_line_names_who_acted() -> None:
     acted = replace(alarm("dry_friction", "acknowledged"), user="ada")
-    assert alarm_line(acted) == "dry friction: alarm, seen by ada"
+    assert alarm_line(acted) == "dry friction: alarm, acknowledged by ada"
 
 
 def test_gap_lines() -> None:

@@ -111,5 +111,5 @@ def test_one_rig_named_twice_is_refused(tmp_path):
     path = rig_file(tmp_path, "a")
     twin = tmp_path / "twin.toml"
     twin.write_text(path.read_text())
-    with pytest.raises(ConfigError, match=r"rig.id: found that of .*rig.toml"):
+    with pytest.raises(ConfigError, match=r"rig.id: found the same as in .*rig.toml"):
         Fleet([path, twin], 1.0)

@@ -41,7 +41,7 @@ def test_figures_are_told_old_while_looks_stall_and_come_back_with_the_next_look
             assert OLD_AFTER <= float(str(old["seconds"])) < OLD_AFTER + 2 * STILL_EVERY
             goes_on.set()
             again = await told(events, b"rigs")  # nothing has changed, but it is new
-            assert again["summary"] == "1 rigs: 0 not well, 0 alarms"
+            assert again["summary"] == "1 rigs: 0 need attention, 0 alarms"
         finally:
             goes_on.set()
             following.cancel()

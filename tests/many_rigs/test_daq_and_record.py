@@ -232,5 +232,5 @@ def test_two_configurations_of_one_rig_are_refused(run, tmp_path):
     path = TestRig(tmp_path).path
     twin = tmp_path / "twin.toml"
     twin.write_text(path.read_text())
-    with pytest.raises(ConfigError, match=r"rig.id: found that of .*rig.toml"):
+    with pytest.raises(ConfigError, match=r"rig.id: found the same as in .*rig.toml"):
         run([path, twin])

@@ -146,7 +146,7 @@ def test_rigs_with_keys_need_routers_of_their_own(tmp_path):
     assert names == ["router", "daq", "monitor", "recorder"]
     base = tmp_path / "base.toml"
     base.write_text(base.read_text() + '[bus.security]\nkeys = "keys"\n')
-    with pytest.raises(ConfigError, match=r"two.toml: bus.listen: found that of .*one.toml"):
+    with pytest.raises(ConfigError, match=r"two.toml: bus.listen: found the address of .*one.toml"):
         plan_several(load_rigs(paths))
     other = f'[bus]\nlisten = "tcp/127.0.0.1:{free_port()}"\n'
     paths[1].write_text(paths[1].read_text() + other)
@@ -158,7 +158,7 @@ def test_two_configurations_of_one_rig_or_only_wrong_ones_are_refused(tmp_path, 
     paths = write_rigs(tmp_path)
     paths[1].write_text(paths[0].read_text())
     assert main(["up", *map(str, paths)]) == 2
-    assert "rig.id: found that of " in capsys.readouterr().err
+    assert "rig.id: found the same as in " in capsys.readouterr().err
     for path in paths:
         path.write_text("[rgi]\n")
     assert main(["up", *map(str, paths)]) == 2

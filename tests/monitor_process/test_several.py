@@ -175,10 +175,10 @@ def test_two_configurations_of_one_rig_or_one_journal_are_refused(tmp_path):
     path = rig_file(tmp_path, "a")
     twin, other = tmp_path / "twin.toml", tmp_path / "other.toml"
     twin.write_text(path.read_text())
-    with pytest.raises(ConfigError, match=r"rig.id: found that of .*rig.toml"):
+    with pytest.raises(ConfigError, match=r"rig.id: found the same as in .*rig.toml"):
         run_several([path, twin])
     other.write_text(path.read_text().replace('id = "a"', 'id = "b"'))
-    with pytest.raises(ConfigError, match=r"monitor.journal: found that of .*rig.toml"):
+    with pytest.raises(ConfigError, match=r"monitor.journal: found the same as in .*rig.toml"):
         run_several([path, other])
 
 

@@ -13,6 +13,8 @@ from rigwatch.commands import main
 from rigwatch.page.scale import Scale, limits
 from rigwatch.page.svg import Plot
 from rigwatch.workbench.explain.verdict_calibration import LATER_COUNTS, later_probability_wrong
+from rigwatch.workbench.fit import Value
+from rigwatch.workbench.report import explanation_lines, next_command
 from rigwatch.workbench.report.html_report import gather
 from rigwatch.workbench.report.sections import headline
 from rigwatch.workbench.report.text_report import doubt_of
@@ -126,6 +128,16 @@ def test_an_undetermined_verdict_is_a_whole_sentence(
         material.explanation, verdict="undetermined", rivals=rivals, also=[], ranking=[best]
     )
     assert headline(replace(material, explanation=found)).endswith(said)
+
+
+def test_a_named_effect_has_its_strength_and_the_command_that_adds_it(study: Study) -> None:
+    found = gather(study).explanation
+    strength = {"Fc": Value(0.43, "N", (0.41, 0.45))}
+    best = replace(found.ranking[0], effect="coulomb", port="load", parameters=strength)
+    named = replace(found, verdict="missing_effect", ranking=[best], beside=["lag@drive"])
+    assert "  coulomb@load: Fc = 0.43 N (0.41 … 0.45)" in explanation_lines(named)
+    assert next_command(named, "rub") == "rigwatch add rub coulomb --port load --with lag@drive"
+    assert next_command(replace(named, verdict="undetermined"), "rub") == ""
 
 
 def test_the_doubt_of_a_later_step_is_that_of_later_steps(study: Study) -> None:

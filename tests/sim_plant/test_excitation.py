@@ -90,7 +90,7 @@ def test_bad_recorded_file_is_reported(tmp_path: Path, text: str):
 
 
 def test_recorded_needs_one_source():
-    with pytest.raises(ConfigError, match="file or samples"):
+    with pytest.raises(ConfigError, match="file and samples"):
         drive(Recorded(), RATE)
 
 

@@ -36,7 +36,7 @@ MISTAKES = [
     ("persistence = 2", "persistence = 0", "rig.toml:22: monitor.alarms.dry_friction.persistence:"
      " found 0, expected int >= 1"),
     ("gain = 1e-6", 'gain = "a"', "rig.toml:12: channels[1].gain: found 'a', expected float"),
-    ('id = "bench1"', "", "rig.toml:1: rig.id: found no such key, expected a value for it"),
+    ('id = "bench1"', "", "rig.toml:1: rig.id: found no value, expected one: it is required"),
     ('id = "bench1"', 'id = "a b"', "rig.toml:2: rig.id: found 'a b', expected str matching regex"
      " '^[A-Za-z0-9_-]+$'"),
     ('"serial"', '"serail"', "rig.toml:15: daq.device.adapter: found 'serail', expected one of"

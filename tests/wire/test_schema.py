@@ -200,8 +200,8 @@ def test_what_is_wrong_with_the_bytes_is_reported(started):
     with pytest.raises(MessageError) as told:
         started.decode(AlarmCommand, odd)
     words = "found 'ignore', expected one of acknowledge, reset, shelve, unshelve"
-    assert str(told.value) == f"AlarmCommand: {len(odd)} bytes that are none: {words}"
-    with pytest.raises(MessageError, match=r"^Event: 3 bytes that are none: "):
+    assert str(told.value) == f"AlarmCommand: {len(odd)} bytes cannot be decoded: {words}"
+    with pytest.raises(MessageError, match=r"^Event: 3 bytes cannot be decoded: "):
         started.decode(Event, b"\xff\xff\xff")
 
 

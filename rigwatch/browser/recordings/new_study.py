@@ -70,7 +70,7 @@ def make_study(
         RigwatchError: there is a study already, or the parts are invalid.
     """
     if (folder / FILE).exists():
-        raise ConfigError(folder / FILE, "", "a study", "another name")
+        raise ConfigError(folder / FILE, "", "an existing study", "another name")
     parts: dict[str, list[Span]] = {use: [] for use in USES}
     for use, path, start, end in spans:
         if use not in parts:

@@ -48,8 +48,8 @@ async def begin(request: Request) -> Response:
         seen = wanted.get("study")
         if seen is not None and digest(open_study(folder).text) != seen:
             raise RigwatchError(
-                f"{name}: the study has been changed elsewhere since this page showed it; it is"
-                " shown anew, look again"
+                f"{name}: the study has been changed elsewhere; the page now shows it as it is,"
+                " nothing was done"
             )
     if task in AT_THE_RIG:
         if context.rig is None:

@@ -19,13 +19,15 @@ TIMEOUT = 3.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("config", type=Path, metavar="CONFIG", help="configuration of the rig")
-    parser.add_argument("name", nargs="?", metavar="NAME", help="alarm; else all")
+    parser.add_argument("name", nargs="?", metavar="NAME", help="name of the alarm; default: all")
     parser.add_argument(
         "--user",
         default="",
-        help="who acts; else the operator's certificate, or without keys the login name",
+        help="who acts; default: the operator of the certificate, or without keys the login name",
     )
-    parser.add_argument("--reset", action="store_true", help="release the latch, once seen")
+    parser.add_argument(
+        "--reset", action="store_true", help="reset latched alarms whose condition has gone"
+    )
     parser.add_argument("--text", default="", help="remark kept in the journal")
 
 

@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
         elif arguments.json:
             print(json.dumps([json_fields(alarm) for alarm in standing], indent=2))
         else:
-            print("\n\n".join(as_text(alarm) for alarm in standing) or "no alarm stands")
+            print("\n\n".join(as_text(alarm) for alarm in standing) or "no active alarms")
     finally:
         bus.close()
     return 0

@@ -1,6 +1,6 @@
 """`rigwatch archive`: a catalogue of many sessions, and questions to it."""
 
-HELP = "catalogue many sessions in a folder or object store, and ask them questions"
+HELP = "catalogue many sessions in a folder or object store, and query them"
 EXAMPLE = """\
   rigwatch archive index sessions --on local:4
   rigwatch archive query sessions friction-growth

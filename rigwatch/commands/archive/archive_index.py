@@ -4,7 +4,7 @@ import argparse
 
 from rigwatch.commands.common import add_on, print_json, say
 
-HELP = "bring the catalogue of an archive up to date: read what is new or changed"
+HELP = "update the catalogue of an archive with new and changed sessions"
 EXAMPLE = """\
   rigwatch archive index sessions
   rigwatch archive index sessions --on local:4

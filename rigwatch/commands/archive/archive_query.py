@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from rigwatch.commands.archive.archive_text import table
 from rigwatch.commands.common import POSITIVE, print_json, say, unix_time, whole
 
-HELP = "ask an archive: a named question, or one SELECT on sessions, alarms, losses and seconds"
+HELP = "query an archive: a named question, or one SELECT on sessions, alarms, losses, seconds"
 EXAMPLE = """\
   rigwatch archive query sessions                            # lists the questions
   rigwatch archive query sessions friction-growth --until 2026-06-01
@@ -21,9 +21,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rig", default="%", help="name of a rig, or a pattern with %%")
     parser.add_argument("--since", metavar="TIME", help="start of the span (ISO, UTC)")
     parser.add_argument("--until", metavar="TIME", help="end of the span (exclusive)")
-    parser.add_argument("--rows", type=whole(1), default=1000, metavar="N", help="most rows (1000)")
     parser.add_argument(
-        "--seconds", type=POSITIVE, default=60.0, metavar="S", help="longest time (60)"
+        "--rows",
+        type=whole(1),
+        default=1000,
+        metavar="N",
+        help="maximum number of rows, default 1000",
+    )
+    parser.add_argument(
+        "--seconds", type=POSITIVE, default=60.0, metavar="S", help="maximum time, default 60"
     )
 
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rigwatch.archive import Retained
     from rigwatch.wire.rig_config import RecorderSection
 
-HELP = "show which sessions are older or larger than wanted, and remove them with --remove"
+HELP = "list the sessions beyond limits of age or size; remove them with --remove"
 EXAMPLE = """\
   rigwatch archive retain sessions --keep-days 90 --keep-alarm-days 730
   rigwatch archive retain sessions --keep-days 90 --keep-alarm-days 730 --remove
@@ -19,9 +19,9 @@ EXAMPLE = """\
   rigwatch archive retain s3://recordings/rigs --rig bench1 --keep-gigabytes 500 --remove"""
 EXIT_FAILED = 1
 _LIMITS = {
-    "keep_days": "age at which sessions go [days]",
+    "keep_days": "age at which sessions are removed [days]",
     "keep_alarm_days": "the same for sessions with alarms [days]",
-    "keep_gigabytes": "size of a rig's sessions above which the oldest go, those with alarms last",
+    "keep_gigabytes": "size of a rig's sessions above which the oldest are removed",
 }
 
 
@@ -32,7 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         option = f"--{name.replace('_', '-')}"
         parser.add_argument(option, type=number(0), default=0.0, metavar="N", help=help_)
     parser.add_argument("--rig", help="only sessions of this rig")
-    parser.add_argument("--remove", action="store_true", help="remove them; else they are shown")
+    parser.add_argument(
+        "--remove", action="store_true", help="remove them; without it they are only listed"
+    )
     parser.add_argument(
         "--keep-seconds",
         action="store_true",

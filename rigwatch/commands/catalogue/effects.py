@@ -14,7 +14,7 @@ EXAMPLE = """\
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("name", nargs="?", help="one effect, all if not given")
+    parser.add_argument("name", nargs="?", help="one effect; default: all")
     parser.add_argument(
         "--save", type=Path, metavar="FILE", help="draw its curves into FILE.svg, one file a curve"
     )

@@ -1,6 +1,6 @@
 """`rigwatch model`: files of equations."""
 
-HELP = "list the models that ship, show one, begin one of your own, check a file"
+HELP = "list the shipped models, show one, start one of your own, check a file"
 EXAMPLE = """\
   rigwatch model list
   rigwatch model show mass-spring-damper

@@ -9,7 +9,7 @@ from rigwatch.commands.common import check_folder, print_json, say
 if TYPE_CHECKING:
     from rigwatch.workbench.catalogue import ModelReport
 
-HELP = "check a model's units, names, ports and what its outputs show of its states; draw a run"
+HELP = "check a model's units, names, ports and observability; draw a run"
 EXAMPLE = """\
   rigwatch model check my_rig.toml
   rigwatch model check heated-block --input ambient=293 --save run.svg"""
@@ -17,7 +17,7 @@ EXAMPLE = """\
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the action."""
-    parser.add_argument("model", help="a file, or the name of a model that ships")
+    parser.add_argument("model", help="a file, or the name of a shipped model")
     parser.add_argument(
         "--input", action="append", default=[], metavar="NAME=VALUE",
         help="value of an input during the run, in SI; may be repeated",

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rigwatch.commands.common import check_folder, print_json
 
-HELP = "begin a model of your own as a copy of one that ships"
+HELP = "start a model of your own from a copy of a shipped one"
 EXAMPLE = "  rigwatch model new my_rig.toml --like mass-spring-damper"
 
 
@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, help="the new file (.toml)")
     parser.add_argument(
         "--like", default="mass-spring-damper", metavar="MODEL",
-        help="model to begin from (default: %(default)s)",
+        help="model to start from (default: %(default)s)",
     )  # fmt: skip
 
 

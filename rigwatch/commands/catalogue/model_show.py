@@ -10,7 +10,7 @@ EXAMPLE = "  rigwatch model show servo-pneumatic"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the action."""
-    parser.add_argument("model", help="name of a model that ships, or a file")
+    parser.add_argument("model", help="name of a shipped model, or a file")
 
 
 def run(arguments: argparse.Namespace) -> int:

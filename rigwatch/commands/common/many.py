@@ -21,7 +21,7 @@ Finder = Callable[[Path], list[Path]]
 
 def add_many(parser: argparse.ArgumentParser, name: str, help_: str) -> None:
     """The argument for the units, called `name`, and where and how they are worked on."""
-    several = f"{help_}; several, globs and folders of them too"
+    several = f"{help_}; or several, globs and folders"
     parser.add_argument(name, type=_place, nargs="+", help=several)
     add_where(parser)
 

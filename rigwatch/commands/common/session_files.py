@@ -132,8 +132,8 @@ def report_written(written: "Written", as_json: bool) -> None:
     if as_json:
         print_json(written)
         return
-    counts = ", ".join(f"{count} {name}" for name, count in sorted(written.messages.items()))
-    print(f"{written.path}: {written.samples} samples in messages {counts}")
+    counts = ", ".join(f"{name} {count}" for name, count in sorted(written.messages.items()))
+    print(f"{written.path}: {written.samples} samples; messages: {counts}")
     for line in damage_lines(written.lost):
         print(line)
     if written.notes:

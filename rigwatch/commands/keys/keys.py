@@ -1,6 +1,6 @@
 """`rigwatch keys`: the authority of a rig and its certificates."""
 
-HELP = "make, issue, revoke and show the certificates of a rig's processes and operators"
+HELP = "create, issue, revoke and show the certificates of a rig's processes and operators"
 EXAMPLE = """\
   rigwatch keys new keys --rig bench1 --address 192.168.1.5
   rigwatch keys issue keys ann --role operator

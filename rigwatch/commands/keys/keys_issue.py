@@ -3,15 +3,17 @@
 import argparse
 from pathlib import Path
 
-HELP = "issue a certificate; one that the name has is revoked"
+HELP = "issue a certificate and revoke the previous one of the name"
 EXAMPLE = "  rigwatch keys issue keys ann --role operator"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder of the keys")
-    parser.add_argument("name", metavar="NAME", help="whose, such as daq or ann")
-    parser.add_argument("--role", help="role; the name itself if not given")
+    parser.add_argument(
+        "name", metavar="NAME", help="name of the process or person, such as daq or ann"
+    )
+    parser.add_argument("--role", help="role; default: the name itself")
     parser.add_argument(
         "--address", action="append", default=[], help="name or address of the router's machine"
     )

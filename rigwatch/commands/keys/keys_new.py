@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-HELP = "make the authority of a rig and a certificate for each role"
+HELP = "create the authority of a rig and a certificate for each role"
 EXAMPLE = "  rigwatch keys new keys --rig bench1 --address 192.168.1.5"
 
 

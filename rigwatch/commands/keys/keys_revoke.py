@@ -11,7 +11,7 @@ EXAMPLE = "  rigwatch keys revoke keys ann"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder of the keys")
-    parser.add_argument("name", metavar="NAME", help="whose")
+    parser.add_argument("name", metavar="NAME", help="name of the process or person")
 
 
 def run(arguments: argparse.Namespace) -> int:

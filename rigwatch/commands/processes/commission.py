@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 TRANSFER_S, EQUATIONS_S = (3.0, 3.0), (10.0, 65.0)
 """Time of commissioning: at least, and more for each 100 000 samples [s]."""
-HELP = "make a model file from commissioning recordings"
+HELP = "create the monitor's model file from commissioning recordings"
 EXAMPLE = (
     "  rigwatch commission --chirp sessions/chirp --healthy sessions/healthy "
     "--friction sessions/known-friction --output configs/bench1-model.toml"
@@ -45,8 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scheme",
         choices=("auto", "transfer", "equations"),
         default="auto",
-        help="what the rig is watched by: a transfer function and its healthy average, equations "
-        "along the measured motion (no --friction needed), or whichever describes the healthy rig",
+        help="how the rig is monitored: by a transfer function and its healthy average, equations "
+        "along the measured motion (no --friction needed), or by whichever describes it",
     )
     parser.add_argument(
         "--equations",

@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="no window; ends once friction is named, with exit code 0 only if it is",
     )
-    parser.add_argument("--seconds", type=POSITIVE, metavar="N", help="longest run time [s]")
+    parser.add_argument("--seconds", type=POSITIVE, metavar="N", help="maximum run time [s]")
     parser.add_argument("--folder", type=Path, default=Path("demo-session"), help="output folder")
     parser.add_argument(
         "--commission-only", action="store_true", help="make the model of the simulated rig and end"

@@ -26,8 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fix",
         action="store_true",
-        help="mend configuration, model, journal, positions and sessions that an earlier version "
-        "or a kill has left; each file as it was stays beside it",
+        help="repair configuration, model, journal, positions and sessions of earlier versions or "
+        "after a kill; the previous file stays beside each",
     )
     parser.add_argument(
         "--alive",

@@ -26,17 +26,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     help_ = "configurations of the rigs, on one router or several"
     parser.add_argument("config", type=Path, nargs="+", metavar="CONFIG", help=help_)
-    parser.add_argument("--follow", action="store_true", help="again every two seconds")
+    parser.add_argument("--follow", action="store_true", help="repeat every two seconds")
     parser.add_argument(
         "--timeout",
         type=number(0, 3600, above=True),
         default=3.0,
         metavar="S",
-        help="longest wait for a rig (3)",
+        help="maximum wait for a rig, default 3",
     )
     parser.add_argument("--page", type=Path, metavar="FILE.html", help="write a web page instead")
     parser.add_argument("--serve", action="store_true", help="serve a live web page instead")
-    parser.add_argument("--port", type=PORT, default=0, help="of that page, else a free one")
+    parser.add_argument(
+        "--port", type=PORT, default=0, help="port of that page; default: a free one"
+    )
     parser.add_argument("--open", action="store_true", help="open it in this machine's browser")
 
 

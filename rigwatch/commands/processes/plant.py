@@ -24,20 +24,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     talk.add_argument(
         "--set", action="append", default=[], metavar="EFFECT=VALUE", help="set an effect"
     )
-    talk.add_argument("--over", type=number(0), default=0.0, metavar="S", help="as a ramp over S")
+    talk.add_argument(
+        "--over", type=number(0), default=0.0, metavar="S", help="change it over S seconds"
+    )
     talk.add_argument("--clear", action="store_true", help="remove all effects")
     talk.add_argument("--effects", action="store_true", help="list the effects and their values")
     talk.add_argument(
         "--line-fault", metavar="NAME[=FRAMES]", help="disturb the serial line for some frames"
     )
-    talk.add_argument("--tell", metavar="LINE", help="any other line, such as 'restart'")
+    talk.add_argument("--tell", metavar="LINE", help="any other command, such as 'restart'")
     record = parser.add_argument_group("record faster than real time")
     record.add_argument("--session", type=Path, metavar="OUT.mcap", help="write a session here")
     record.add_argument(
         "--seconds", type=POSITIVE, metavar="S", help="length; default: the scenario's"
     )
     record.add_argument(
-        "--seed", type=whole(0), default=1, metavar="N", help="of the sensors' noise"
+        "--seed", type=whole(0), default=1, metavar="N", help="seed of the sensors' noise"
     )
 
 

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-HELP = "say when the monitor is stale, and notify people of alarms"
+HELP = "raise an alarm when the monitor stops, and notify people of alarms"
 EXAMPLE = "  rigwatch witness configs/demo.toml"
 
 

@@ -15,7 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("session", type=Path, help="session file or folder of segments")
     parser.add_argument("target", type=Path, help="the new file, .csv, .mat or .parquet")
-    parser.add_argument("--estimates", action="store_true", help="estimates in place of samples")
+    parser.add_argument("--estimates", action="store_true", help="estimates instead of samples")
     parser.add_argument("--device", help="device, if the session has several")
     add_span(parser)
 

@@ -19,7 +19,7 @@ from rigwatch.wire.errors import ImportDataError
 if TYPE_CHECKING:
     from rigwatch.wire.exchange import Imported, ImportMapping
 
-HELP = "make a session from a CSV, MAT, Parquet or JSON file, or many from many"
+HELP = "import CSV, MAT, Parquet or JSON files as sessions"
 EXAMPLE = """\
   rigwatch import DATA_EMPS.mat emps.mcap --mapping emps
   rigwatch import run.csv run.mcap --time 't[ms]' --map 'position=qm[mm]' --map 'force=u*35.15[N]'

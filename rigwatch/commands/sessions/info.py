@@ -46,15 +46,25 @@ def _lines(summary: "Summary") -> list[str]:
         lines += _device_lines(device)
     counts = ", ".join(f"{name} {count}" for name, count in summary.topics.items())
     lines.append(f"messages: {counts}")
-    lines += [
-        f"alarm: {iso_time(alarm.t_ns)} {alarm.name} {alarm.state}: {alarm.cause}"
-        for alarm in summary.alarms
-    ]
+    lines += _alarm_lines(summary)
     if summary.unknown_ends:
         lines.append(f"the end of {summary.unknown_ends} start(s) is missing, length unknown")
-    lines += [f"{n} {topic} are missing" for topic, n in summary.lost_messages.items() if n]
+    lines += [f"missing {topic}: {n}" for topic, n in summary.lost_messages.items() if n]
     lines += damage_lines(summary.lost)
     lines += [f"not closed (still recording, or killed): {name}" for name in summary.unclosed]
+    return lines
+
+
+def _alarm_lines(summary: "Summary") -> list[str]:
+    """Every change of an alarm; its cause where it is raised."""
+    from rigwatch.wire.session import iso_time
+
+    lines, standing = [], set[str]()
+    for alarm in summary.alarms:
+        raised = alarm.state != "normal" and alarm.name not in standing
+        cause = f": {alarm.cause}" if raised else ""
+        lines.append(f"alarm: {iso_time(alarm.t_ns)} {alarm.name} {alarm.state}{cause}")
+        (standing.discard if alarm.state == "normal" else standing.add)(alarm.name)
     return lines
 
 

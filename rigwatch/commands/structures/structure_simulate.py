@@ -10,7 +10,7 @@ from rigwatch.wire.errors import ModelError
 if TYPE_CHECKING:
     from sim_plant.structure import Damage
 
-HELP = "simulate a record, to try the other actions"
+HELP = "simulate a record, to try the other commands on"
 EXAMPLE = """\
   rigwatch structure simulate configs/structures/kabe_antenna.toml antenna.csv
   rigwatch structure simulate kabe.toml damaged.csv --damage 5 springs.k4_46.stiffness=50
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=whole(0), default=0, help="seed of noise and earthquake")
     parser.add_argument(
         "--damage", nargs=2, action="append", metavar=("SECONDS", "PLACE=VALUE"),
-        help="change a number of the file from that time on",
+        help="change a coefficient from that time on",
     )  # fmt: skip
 
 

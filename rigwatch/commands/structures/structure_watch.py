@@ -10,7 +10,7 @@ from rigwatch.commands.structures.structure_files import add_test
 if TYPE_CHECKING:
     from rigwatch.structures.live import LiveDamage
 
-HELP = "monitor a structure for damage: samples in; residuals, alarm and place of the damage out"
+HELP = "monitor a structure: samples in; residuals, alarm and place of damage out"
 EXAMPLE = """\
   rigwatch structure watch configs/structures/kabe_antenna.toml rig.toml
   rigwatch structure watch configs/structures/kabe_antenna.toml sessions/antenna.mcap"""
@@ -30,7 +30,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--undamaged", type=POSITIVE, default=2.0, metavar="SECONDS",
         help="length of the undamaged start, default 2",
     )  # fmt: skip
-    parser.add_argument("--span", type=POSITIVE, default=60.0, metavar="SECONDS", help="default 60")
+    parser.add_argument(
+        "--span",
+        type=POSITIVE,
+        default=60.0,
+        metavar="SECONDS",
+        help="period of the false-alarm probability, default 60",
+    )
     add_test(
         parser, "within --span", "length of data after an alarm used to find the place, default 2"
     )

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rigwatch.commands.common import print_json, say
 
-HELP = "add an effect to the model of a study, refit, compare; refused if the held-out error rises"
+HELP = "add an effect to the model of a study and refit; refused unless the held-out error falls"
 EXAMPLE = """\
   rigwatch add emps coulomb
   rigwatch add emps offset --port force_sensor
@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("study", type=Path, help="the study's folder")
     parser.add_argument("effect", nargs="?", help="name of the effect")
-    parser.add_argument("--port", help="where it acts, if several places are possible")
+    parser.add_argument("--port", help="port where it acts, if several are possible")
     parser.add_argument(
         "--anyway", action="store_true", help="add it even though the held-out error does not fall"
     )
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="EFFECT@PORT",
         help="effects that are missing as well: if refused alone, it is added if the whole set"
-        " lowers the held-out error and each effect of it does beside the others",
+        " lowers the held-out error, and each effect of it with the others in the model",
     )
     parser.add_argument(
         "--effect-file",
@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
             if arguments.json:
                 print_json({"step": "effect-file", "effects": names})
             else:
-                print(f"{study.folder}: will be ranked beside the others: {', '.join(names)}")
+                print(f"{study.folder}: will be ranked with the others: {', '.join(names)}")
             return 0
     if arguments.effect is None:
         raise ModelError("add: found no effect, expected its name, or --effect-file")

@@ -39,7 +39,7 @@ def _line(found: dict[str, Any]) -> str:
 
 def _run_one(arguments: argparse.Namespace, folder: Path) -> int:
     from rigwatch.workbench.explain import as_data, explain
-    from rigwatch.workbench.report import explanation_lines
+    from rigwatch.workbench.report import explanation_lines, next_command
     from rigwatch.workbench.study import open_study
 
     found = explain(open_study(folder), progress=say)
@@ -47,4 +47,6 @@ def _run_one(arguments: argparse.Namespace, folder: Path) -> int:
         print_json(as_data(found))
         return 0
     print("\n".join(explanation_lines(found)))
+    if command := next_command(found, f"{folder}"):
+        print(f"next: {command}")
     return 0

@@ -1,6 +1,6 @@
 """`rigwatch study`: a model, recordings, and every step taken with them."""
 
-HELP = "make a study of a model and recordings, show its steps, promote its result"
+HELP = "create a study of a model and recordings, show its steps, promote its result"
 EXAMPLE = """\
   rigwatch study new emps --template configs/studies/emps.toml --sessions recordings/
   rigwatch study base rubbing

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rigwatch.commands.common import print_json
 
-HELP = "accept changed recordings, which a study refuses otherwise"
+HELP = "accept recordings that have changed since the last step"
 EXAMPLE = "  rigwatch study accept-data emps"
 
 

@@ -10,7 +10,7 @@ from rigwatch.commands.common import print_json, say
 if TYPE_CHECKING:
     from rigwatch.workbench.study import Study
 
-HELP = "rank the model's variants by the healthy recordings held out, or use an own model file"
+HELP = "rank the model's variants by the healthy recordings, or replace the model file"
 EXAMPLE = """\
   rigwatch study base rubbing
   rigwatch study base rubbing --take first_order_valve,isothermal
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--model-file",
         type=Path,
         metavar="TOML",
-        help="own model file: copied into the study and used from now on; see `rigwatch model new`",
+        help="your own model file, copied into the study and used from then on",
     )
 
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rigwatch.workbench.steps import Logs
 
 _NUMBER = re.compile(r"[A-Za-z_][\w.]*(\s*\[[^\]]+\])?")
-HELP = "make a study of logs and a model, or from a template"
+HELP = "create a study from logs and a model, or from a template"
 EXAMPLE = """\
   rigwatch study new drive --data run1.csv run2.csv --model motor --set R=2.0 --set K=0.06
   rigwatch study new drive --data a.csv b.csv --model motor --set a:J=2e-4 --set b:J=5e-4
@@ -39,7 +39,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--model", help="a shipped model's name, or a model file, for --data")
     parser.add_argument(
-        "--healthy", type=Path, nargs="+", default=[], metavar="LOG", help="logs with nothing wrong"
+        "--healthy",
+        type=Path,
+        nargs="+",
+        default=[],
+        metavar="LOG",
+        help="logs of the healthy machine",
     )
     parser.add_argument(
         "--set",

@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--user",
         default="",
-        help="who acts; else the operator's certificate, or without keys the login name",
+        help="who acts; default: the operator of the certificate, or without keys the login name",
     )
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rigwatch.commands.common import PORT, say, tell_address, whole
 
-HELP = "open the studies of a folder in a browser: see, add what is missing, watch the error fall"
+HELP = "open the studies of a folder in a browser: compare, explain, add, undo"
 EXAMPLE = """\
   rigwatch workbench studies/
   rigwatch workbench studies/ --rig configs/story.toml
@@ -16,13 +16,15 @@ OWN_FOLDER = Path("workbench")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument(
-        "folder", type=Path, nargs="?", help="folder of studies and recordings, else ./workbench"
+        "folder", type=Path, nargs="?", help="folder of studies and recordings, default ./workbench"
     )
     parser.add_argument("--rig", type=Path, metavar="CONFIG", help="configuration of a rig to show")
-    parser.add_argument("--port", type=PORT, default=0, help="else a free one")
-    parser.add_argument("--address", default="127.0.0.1", help="where it listens")
+    parser.add_argument(
+        "--port", type=PORT, default=0, help="port to listen on; default: a free one"
+    )
+    parser.add_argument("--address", default="127.0.0.1", help="address to listen on")
     parser.add_argument("--certificate", type=Path, metavar="PEM", help="certificate for TLS")
-    parser.add_argument("--key", type=Path, metavar="PEM", help="its key")
+    parser.add_argument("--key", type=Path, metavar="PEM", help="private key of the certificate")
     parser.add_argument(
         "--behind-proxy",
         action="append",

@@ -35,8 +35,8 @@ OTHERS: tuple[Colour, ...] = (
 STATES: dict[AlarmState, tuple[str, Colour]] = {
     "normal": ("normal", (38, 92, 62)),
     "unacknowledged": ("ALARM", (226, 54, 54)),
-    "acknowledged": ("alarm, seen", (214, 124, 36)),
-    "cleared_unacknowledged": ("over, not yet seen", (150, 110, 30)),
+    "acknowledged": ("alarm, acknowledged", (214, 124, 36)),
+    "cleared_unacknowledged": ("cleared, not acknowledged", (150, 110, 30)),
 }
 """Label and colour of each alarm state."""
 
@@ -44,11 +44,11 @@ STATES: dict[AlarmState, tuple[str, Colour]] = {
 _ALARM: Colour = STATES["unacknowledged"][1]
 VERDICTS: dict[str, tuple[str, Colour]] = {
     "waiting": ("no estimates yet", (70, 70, 78)),
-    "learning": ("learning what is healthy", (60, 90, 130)),
+    "learning": ("learning the healthy reference", (60, 90, 130)),
     "healthy": ("healthy", (36, 140, 84)),
     "no_verdict": ("no verdict", (84, 92, 110)),
-    "over": ("over, not yet seen", (150, 110, 30)),
-    "departure": ("departed from the model", (220, 120, 30)),
+    "over": ("cleared, not acknowledged", (150, 110, 30)),
+    "departure": ("departure from the model", (220, 120, 30)),
     "dry_friction": ("DRY FRICTION", _ALARM),
     "stiction": ("STICTION", (200, 40, 110)),
     "other_fault": ("OTHER FAULT", (190, 70, 30)),

@@ -16,8 +16,8 @@ _COUNTER_HEAD = "| | now | mean | worst |"
 _ENDS = ("low", "high", "signature")
 
 _CALM = {
-    "waiting": ("# No estimates yet", "Samples arrive; the monitor is silent so far."),
-    "learning": ("# Learning", "The monitor is learning how this run looks while it is healthy."),
+    "waiting": ("# No estimates yet", "Samples arrive, but no estimate from the monitor yet."),
+    "learning": ("# Learning", "The monitor is learning the healthy reference of this run."),
     "no_verdict": ("# No verdict now", "Too little motion to see friction. Move the rig."),
     "healthy": ("# Healthy", "The rig moves as its model says. Nothing to do."),
 }
@@ -34,11 +34,13 @@ def status(facts: Facts) -> str:
     """How reliable the verdict is: counters of the processes, and their warnings."""
     rows = [*_counter_rows(facts)]
     if facts.age.known:
-        rows.append(_row("age of the picture [ms]", facts.age.now, facts.age.mean, facts.age.worst))
+        rows.append(
+            _row("age of newest sample [ms]", facts.age.now, facts.age.mean, facts.age.worst)
+        )
     complaints = [f"* {h.source}: {h.state}, {h.text}" for h in facts.health.values() if h.text]
-    complaints += [f"* over, not yet seen: {title(a.name)}" for a in facts.book.unseen()]
+    complaints += [f"* cleared, not acknowledged: {title(a.name)}" for a in facts.book.unseen()]
     if facts.skipped:
-        complaints.append(f"* this screen left out {facts.skipped} messages to keep up")
+        complaints.append(f"* this screen skipped {facts.skipped} messages to keep up")
     if facts.lost_alarms:
         complaints.append(f"* {facts.lost_alarms} alarms never reached this screen")
     return _paragraphs(_model(facts), _table(_COUNTER_HEAD, rows), "\n".join(complaints))
@@ -55,10 +57,10 @@ def _verdict(facts: Facts) -> Iterator[str]:
         yield from (f"# Waiting for {facts.rig}", "No sample has arrived yet.")
     elif verdict == "stale":
         yield "# NO SAMPLES"
-        yield f"Nothing for {facts.silent_s:.0f} s. What is drawn is old: look at daq and its line."
+        yield f"Nothing for {facts.silent_s:.0f} s. What is drawn is old: check daq and its line."
     elif verdict == "over":
-        yield f"# Over: {title(unseen[0].name)}"
-        yield f"{_sentence(unseen[0].cause)} It has gone, and nobody has acknowledged it."
+        yield f"# Cleared: {title(unseen[0].name)}"
+        yield f"{_sentence(unseen[0].cause)} The alarm has cleared by itself; acknowledge it."
     elif remarks:
         yield from ("# No verdict now", _sentence(remarks[0].cause), remarks[0].guidance)
     else:

@@ -122,7 +122,7 @@ def _identified(
     covariance, turns = outcome.covariance, outcome.iterations
     if covariance is None or not (outcome.converged or _settled(turns, covariance)):
         raise ModelError(
-            f"{structure.name}: found no figures that explain the undamaged"
+            f"{structure.name}: found no parameters that explain the undamaged"
             f" {samples * record.dt:g} s, expected other guesses or a longer undamaged start"
         )
     return problem.names, turns[-1], covariance

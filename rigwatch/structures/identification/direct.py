@@ -34,7 +34,9 @@ def solve(problem: Problem, *, iterations: int = 25) -> Outcome:
     """
     system = problem.sweeper.compiled.system
     if len(problem.loose):
-        raise ModelError(f"{system.model.name}: the direct approach finds no initial states")
+        raise ModelError(
+            f"{system.model.name}: direct cannot identify initial states, expected known ones"
+        )
     states, rates = motion(problem)
     scale = np.sqrt(np.mean(rates**2, axis=0))
     scale = np.where(scale > 0, scale, 1.0)

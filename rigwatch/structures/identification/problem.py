@@ -174,7 +174,9 @@ def problem_of(
     states = list(tools.compiled.system.states)
     loose = np.array([states.index(name.removesuffix("(0)")) for name in start_names], np.int64)
     if not len(tools.compiled.system.free) + len(loose):
-        raise ModelError(f"{model.name}: found nothing that is unknown, expected some")
+        raise ModelError(
+            f"{model.name}: found no unknown, expected at least one (`unknown = true` or --unknown)"
+        )
     if first < 0 or len(recording) - first < 2:
         found = f"{len(recording) - first} samples from sample {first} on"
         raise ModelError(f"{model.name}: found {found}, expected at least 2")

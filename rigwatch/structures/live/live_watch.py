@@ -38,7 +38,7 @@ Said = EstimateBlock | Alarm | Event
 
 ALARM, SOURCE = "structure_damage", "structure"
 CAUSE = "the structure does not move as the undamaged one would"
-GUIDANCE = "unload the structure and inspect it; its place follows as an event"
+GUIDANCE = "Unload the structure and inspect it. The event DAMAGE names the place within seconds."
 
 
 @dataclass(frozen=True)

@@ -108,4 +108,4 @@ def _check_signature(certificate: "x509.Certificate", proof: Proof, signed: byte
             raise InvalidSignature
         key.verify(bytes.fromhex(proof.signature), signed, ec.ECDSA(hashes.SHA256()))
     except (InvalidSignature, ValueError):
-        raise KeysError("its signature does not fit what it says") from None
+        raise KeysError("its signature does not match its content") from None

@@ -90,7 +90,9 @@ def decode(kind: type[M], data: bytes) -> M:
     try:
         message: M = _read(kind, proto_class(kind.__name__).FromString(data))
     except (DecodeError, MessageError) as error:
-        raise MessageError(f"{kind.__name__}: {len(data)} bytes that are none: {error}") from error
+        raise MessageError(
+            f"{kind.__name__}: {len(data)} bytes cannot be decoded: {error}"
+        ) from error
     _check_lengths(message)
     return message
 

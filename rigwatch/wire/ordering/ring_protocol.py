@@ -102,5 +102,5 @@ def _parsed(data: bytes, read: Callable[[bytes], S]) -> RingReply[S]:
             blocks.append(read(data[at : at + length]))
             at += length
     except struct.error:
-        raise MessageError(f"reply of the ring: {len(data)} bytes that are none") from None
+        raise MessageError(f"reply of the ring: {len(data)} bytes cannot be decoded") from None
     return RingReply(boot, settled, tuple(blocks))

@@ -40,7 +40,7 @@ def explained(
         return ConfigError(file, key, "an unknown key", expected, line_of(text, key))
     if match := _MISSING.search(reason):
         key = _below(path, match["key"])
-        return ConfigError(file, key, "no such key", "a value for it", line_of(text, path))
+        return ConfigError(file, key, "no value", "one: it is required", line_of(text, path))
     if isinstance(error.__cause__, UnitError):
         unit, key = error.__cause__, _below(path, "unit")
         return ConfigError(file, key, unit.found, unit.expected, line_of(text, key))

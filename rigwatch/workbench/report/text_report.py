@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from rigwatch.workbench.compare import Bases, Comparison, Region
 from rigwatch.workbench.explain import Explanation, Row
-from rigwatch.workbench.fit import Value, error_text
+from rigwatch.workbench.fit import Value, error_text, shown
 from rigwatch.workbench.steps import Change
 from rigwatch.workbench.study import GIVEN, Held
 
@@ -110,6 +110,7 @@ def explanation_lines(found: Explanation, most: int = 12) -> list[str]:
         f"verdict: {VERDICTS[found.verdict]}",
         f"  {found.text}",
         f"  {doubt_of(found)}",
+        *_named_lines(found),
         "",
         f"now: training {base.train_error:.4g}, held out {base.held_out_error:.4g},"
         f" noise floor {base.noise_floor:.4g} {base.unit}",
@@ -123,6 +124,29 @@ def explanation_lines(found: Explanation, most: int = 12) -> list[str]:
     if found.next_experiment:
         lines += ["", f"next experiment: {found.next_experiment.text}"]
     return lines + [f"note: {remark}" for remark in base.remarks]
+
+
+def _named_lines(found: Explanation) -> list[str]:
+    """The fitted parameters of the effect that the verdict names."""
+    if found.verdict != "missing_effect" or not found.ranking:
+        return []
+    best = found.ranking[0]
+    fitted = [f"{n} = {shown(v)}" for n, v in best.parameters.items() if v.interval is not None]
+    return [f"  {best.effect}@{best.port}: {', '.join(fitted)}"] if fitted else []
+
+
+def next_command(found: Explanation, study: str) -> str:
+    """The command that adds the effect that the verdict names; empty if it names none.
+
+    Args:
+        found: the explanation.
+        study: the study's folder, as on the command line.
+    """
+    if found.verdict != "missing_effect" or not found.ranking:
+        return ""
+    best = found.ranking[0]
+    others = f" --with {' '.join(found.beside)}" if found.beside else ""
+    return f"rigwatch add {study} {best.effect} --port {best.port}{others}"
 
 
 def doubt_of(found: Explanation) -> str:

@@ -64,12 +64,14 @@ def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
 
 def _file(files: NewFiles, logs: Logs, model: Model, reading: Matched) -> tuple[str, list[str]]:
     """The text of the study's file, and remarks on its choices."""
+    columns = reading.channels | ({"time": reading.time} if reading.time else {})
     spans = [Span(session=f"{path.stem}.mcap") for path in logs.data]
     tables = [read_columns(files.folder, span) for span in spans]
     driving = [n for n in _channels(model.inputs) if n in tables[0].values]
     outputs = [n for n in _channels(model.outputs) if n in tables[0].values]
     train, held_out = proposed_split(tables, driving or outputs)
-    lines, choices = [f'model = "{_named(files, logs.model)}"'], list[str]()
+    lines = [f'model = "{_named(files, logs.model)}"']
+    choices = [f"columns: {_as_read(columns)}"] if columns else []
     rates = [1 / table.dt for table in tables]
     if max(rates) / min(rates) > 1 + RATES_ALIKE:
         lines.append(f"rate = {min(rates):.6g}  # the slowest log's")
@@ -106,6 +108,15 @@ def _file(files: NewFiles, logs: Logs, model: Model, reading: Matched) -> tuple[
             f" --set {known[0]}=VALUE"
         )
     return "\n".join(lines) + "\n", choices
+
+
+def _as_read(columns: Mapping[str, str]) -> str:
+    """Which column each channel is read from, and in which unit."""
+    read = ((channel, *text.rpartition("[")) for channel, text in columns.items())
+    return "; ".join(
+        f"{channel} from {column.strip()!r} in {unit.rstrip(' ]')}"
+        for channel, column, _, unit in read
+    )
 
 
 def _channels(signals: Mapping[str, Input] | Mapping[str, Output]) -> list[str]:

@@ -38,7 +38,9 @@ def test_headers_tell_channels_and_units_and_the_study_can_be_fitted(tmp_path, r
     other = log(MACHINES["motor"], {"coulomb": 0.02}, 0.003, seed=2)
     paths = [written(tmp_path / f"run{i}.csv", t) for i, t in enumerate((run, other), 1)]
     assert made(tmp_path, *paths) == 0
-    assert f"next: rigwatch explain {tmp_path / 'study'}" in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert f"next: rigwatch explain {tmp_path / 'study'}" in said.out
+    assert "speed from 'speed_rad_s' in rad/s" in said.err
     study = open_study(tmp_path / "study")
     assert {span.session for span in (*study.file.train, *study.file.held_out)} == {
         "run1.mcap", "run2.mcap",

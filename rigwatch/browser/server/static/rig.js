@@ -100,7 +100,7 @@ function numbers(name, values) {
 function pause(on) {
   paused = on;
   $("pause").setAttribute("aria-pressed", on);
-  $("pause").textContent = on ? "Go on" : "Pause";
+  $("pause").textContent = on ? "Resume" : "Pause";
   if (!on) draw();
 }
 
@@ -125,12 +125,12 @@ function alarms(found) {
     items.set(one.name, { text, made });
   }
   const standing = found.filter((one) => one.state !== "normal").map((one) => plain(one.name));
-  say(standing.length ? `alarms: ${standing.join(", ")}` : "no standing alarms");
+  say(standing.length ? `alarms: ${standing.join(", ")}` : "no active alarms");
 }
 
 function alarm(one) {
   const item = element("article", "", { class: `alarm ${one.state}`, "data-alarm": one.name, "data-state": one.state });
-  item.append(element("h3", plain(one.name)), element("p", `${one.severity}, ${one.state === "normal" ? "over" : plain(one.state)}, since ${since(one.t_ns)}${one.first_out ? ", the first" : ""}${one.user ? `, by ${one.user}` : ""}`, { class: "note" }));
+  item.append(element("h3", plain(one.name)), element("p", `${one.severity}, ${one.state === "normal" ? "cleared" : plain(one.state)}, since ${since(one.t_ns)}${one.first_out ? ", first-out" : ""}${one.user ? `, by ${one.user}` : ""}`, { class: "note" }));
   const [what, probable] = one.cause.split("; probably missing: ");
   item.append(element("p", what));
   if (probable) item.append(element("p", `probably missing: ${probable}`, { class: "probable" }));
