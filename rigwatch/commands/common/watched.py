@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rigwatch.wire.errors import SessionError
 
 if TYPE_CHECKING:
-    from rigwatch.wire.messages import Alarm, Message
+    from rigwatch.wire.messages import Message
     from rigwatch.wire.session import Session
 
 Span = tuple[int | None, int | None]
@@ -30,25 +30,16 @@ def messages_of(session: "Session", span: Span, model: Path | None) -> "Iterator
     Raises:
         ConfigError: the model cannot be read.
     """
-    from rigwatch.wire.session import message_time
+    from rigwatch.wire.session import message_time, standing_alarms
 
     topics = _OTHERS if model is not None else [*_OTHERS, "alarms"]
     others = (item.message for item in session.messages(topics, *span))
     if model is not None:
         return heapq.merge(others, _monitored(session, span, model), key=message_time)
-    standing = _standing(session, span[0])
+    # Placed at the part's start, where they still hold.
+    start = span[0] or 0
+    standing = (replace(alarm, t_ns=start) for alarm in standing_alarms(session, span[0]))
     return heapq.merge(standing, others, *_recorded(session, span), key=message_time)
-
-
-def _standing(session: "Session", start: int | None) -> "list[Alarm]":
-    """The alarms raised before `start` [ns] that are not normal there, as of `start`."""
-    from rigwatch.wire.messages import Alarm
-
-    if start is None:
-        return []
-    before = (item.message for item in session.messages(["alarms"], None, start))
-    last = {alarm.name: alarm for alarm in before if isinstance(alarm, Alarm)}
-    return [replace(alarm, t_ns=start) for alarm in last.values() if alarm.state != "normal"]
 
 
 def model_for(session: "Session", span: Span, given: Path | None) -> tuple[Path | None, bool]:

@@ -4,7 +4,14 @@
 describes.
 """
 
-from rigwatch.wire.session.edit import Written, first_time, iso_time, recover, trim
+from rigwatch.wire.session.edit import (
+    Written,
+    first_time,
+    iso_time,
+    recover,
+    standing_alarms,
+    trim,
+)
 from rigwatch.wire.session.losses import Span, without
 from rigwatch.wire.session.merging import LARGEST_BLOCK, merge_pending
 from rigwatch.wire.session.reader import (
@@ -46,6 +53,7 @@ __all__ = [
     "recover",
     "run_info",
     "segment_name",
+    "standing_alarms",
     "summarise",
     "topic_counts",
     "trim",

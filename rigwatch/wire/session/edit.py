@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from rigwatch.wire.errors import SessionError
-from rigwatch.wire.messages import Alarm, Block, Message, RunInfo, SampleBlock, blocks
+from rigwatch.wire.messages import ALARMS, Alarm, Block, Message, RunInfo, SampleBlock, blocks
 from rigwatch.wire.new_file import new_file
 from rigwatch.wire.session.reader import LostSpan, Recorded, Session
 from rigwatch.wire.session.writer import SessionWriter, message_time, run_info
@@ -119,15 +119,18 @@ def iso_time(t_ns: int) -> str:
 
 def _part(session: Session, start: int | None, end: int | None) -> Iterator[Recorded]:
     """Messages of the span, preceded by the alarms active before it."""
-    standing: dict[str, Recorded] = {}
-    if start is not None:
-        for item in session.messages(["alarms"], end=start):
-            if isinstance(item.message, Alarm):
-                standing[item.message.name] = item
-    for item in standing.values():
-        if isinstance(item.message, Alarm) and item.message.state != "normal":
-            yield item
+    for alarm in standing_alarms(session, start):
+        yield Recorded(ALARMS, alarm.t_ns, alarm)
     yield from session.messages(start=start, end=end)
+
+
+def standing_alarms(session: Session, start: int | None) -> list[Alarm]:
+    """The last change of each alarm that is not normal at `start` [ns]; none at the beginning."""
+    if start is None:
+        return []
+    before = (item.message for item in session.messages(["alarms"], end=start))
+    last = {alarm.name: alarm for alarm in before if isinstance(alarm, Alarm)}
+    return [alarm for alarm in last.values() if alarm.state != "normal"]
 
 
 def copy_messages(messages: Iterable[Recorded], run: RunInfo, target: Path) -> Written:
