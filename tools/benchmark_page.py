@@ -41,7 +41,6 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
         (
             "latency",
             "notification",
-            "losses",
             "random_kills",
             "rogue_client",
             "fuzzing",

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.family.rig_folder import CHANNELS, RigFolder, command
+from benchmarks.family.rig_folder import CHANNELS, RigFolder
 from monitor.model import load_model
 from monitor.pipeline import RigMonitor
 from rigwatch.wire.messages import Column, SampleBlock
@@ -48,12 +48,7 @@ def commissioned(folder: Path, member: Member) -> Path:
         write_rig(folder, member, ("watch",))
     rig = RigFolder(folder, folder / "work")
     model = rig.work / "model.toml"
-    words: list[Any] = ["commission", "--output", model, "--chirp", rig.session("watch", "chirp")]
-    for name in rig.truth("watch"):
-        role = name.partition("_")[0]
-        if role in {"healthy", "friction"} and not name.endswith("_free"):
-            words += [f"--{role}", rig.session("watch", name)]
-    if not model.exists() and (run := command(*words)).returncode:
+    if not model.exists() and (run := rig.commission(model)).returncode:
         raise RuntimeError(run.stderr.strip()[-300:])
     return model
 
