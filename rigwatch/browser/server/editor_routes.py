@@ -8,7 +8,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 from starlette.routing import Route
 
-from rigwatch.browser.server.context import answer, body_of, context_of, told
+from rigwatch.browser.server.context import NOT_KEPT, answer, body_of, context_of, told
 from rigwatch.browser.server.places import MODELS, PlaceError
 from rigwatch.browser.views import begun_model, checked, first_text, render
 from rigwatch.physics.engine.equations import shipped_models
@@ -67,7 +67,7 @@ def _page(
         "edit.html", place="edit", has_rig=context_of(request).rig is not None, kind=kind,
         name=name, text=text, trouble=trouble, models=list(shipped_models()), **values,
     )  # fmt: skip
-    return HTMLResponse(html, 404 if trouble else 200, headers={"cache-control": "no-store"})
+    return HTMLResponse(html, 404 if trouble else 200, headers=NOT_KEPT)
 
 
 async def check(request: Request) -> Response:

@@ -1,4 +1,4 @@
-"""The live page of many rigs: one look for all pages that are open, and events for each."""
+"""The live page of many rigs: one poll for all open pages, and events for each."""
 
 import asyncio
 import contextlib
@@ -16,16 +16,17 @@ from starlette.staticfiles import StaticFiles
 
 from rigwatch.browser.server.access import Access, Guard
 from rigwatch.browser.server.application import STATIC, style
+from rigwatch.browser.server.context import NOT_KEPT
 from rigwatch.browser.server.event_streams import STILL_HERE, event, event_stream
 from rigwatch.fleet import Dashboards, RigState, as_live_page, as_part, summary
 from rigwatch.wire.errors import RigwatchError
 
 BETWEEN = 2.0
-"""Time between two looks at the rigs [s]."""
+"""Time between two polls of the rigs [s]."""
 STILL_EVERY = 5.0
-"""Time after which a page without news is told that the server is there [s]."""
+"""Time after which a page without news gets a sign of life [s]."""
 OLD_AFTER = 10.0
-"""Time without a look that ends, after which the pages are told that their figures are old [s]."""
+"""Time without a completed poll after which the pages say that their figures are old [s]."""
 Look = Callable[[], list[RigState]]
 
 
@@ -50,7 +51,7 @@ class FleetPages:
         self._seen_at = time.monotonic()
 
     async def follow(self) -> None:
-        """Look again and again, and tell the open pages."""
+        """Poll the rigs, and notify the open pages."""
         while True:
             states = await asyncio.to_thread(self._look)
             async with self._news:
@@ -59,7 +60,7 @@ class FleetPages:
             await asyncio.sleep(BETWEEN)
 
     async def events(self) -> AsyncGenerator[bytes, None]:
-        """The rigs now, and whenever something has changed; how old they are if looks stall."""
+        """The rigs now, and whenever something has changed; how old they are if polls stall."""
         told = b""
         while True:
             if (silent := time.monotonic() - self._seen_at) > OLD_AFTER:
@@ -87,7 +88,7 @@ def fleet_application(pages: FleetPages, access: Access) -> Starlette:
         pages.dashboards.close()
 
     async def fleet_page(_: Request) -> Response:
-        return HTMLResponse(as_live_page(pages.states), headers={"cache-control": "no-store"})
+        return HTMLResponse(as_live_page(pages.states), headers=NOT_KEPT)
 
     async def events(request: Request) -> Response:
         return event_stream(request, pages.events())

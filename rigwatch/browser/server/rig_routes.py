@@ -25,10 +25,10 @@ from rigwatch.browser.server.context import answer, body_of, context_of, told
 from rigwatch.browser.server.event_streams import STILL_HERE, event, event_stream
 from rigwatch.browser.server.places import PlaceError
 from rigwatch.browser.views import listed, render
-from rigwatch.browser.work import as_plain
 from rigwatch.wire.access import operator_name
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.messages import AlarmCommand
+from rigwatch.wire.typed_files import as_json
 
 ACTIONS = ("acknowledge", "reset")
 EVERY = 0.25
@@ -81,7 +81,7 @@ async def rig_events(request: Request) -> Response:
 async def _events(link: RigLink) -> AsyncGenerator[bytes, None]:
     since, told = 0, b""
     while True:
-        status = msgspec.json.encode(as_plain(link.status()))
+        status = as_json(link.status())
         if status != told:
             told = status
             yield event("status", status)
