@@ -1,4 +1,4 @@
-"""Looks at many rigs at once."""
+"""Polls many rigs at once."""
 
 import contextlib
 import time

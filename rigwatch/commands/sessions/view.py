@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands.common import add_span
+from rigwatch.commands.common import add_span, print_json
 
 if TYPE_CHECKING:
     from rigwatch.dashboard.recording import Drawn
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """0 if it is drawn; returns once a window is closed."""
-    from rigwatch.commands.common import print_json, ready_to_draw, say
+    from rigwatch.commands.common import ready_to_draw, say
     from rigwatch.wire.session import open_session
 
     ready_to_draw(arguments.save, arguments.picture)
@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _silent(text: str) -> None:
+def _silent(_: str) -> None:
     """Print nothing but JSON."""
 
 
@@ -101,9 +101,8 @@ def _draw(arguments: argparse.Namespace, say: Callable[[str], None], url: str) -
         facts.model, facts.marks = model.name, marks_of(model)
     windows = recording.windows_for(_watched.length_of(session, span))
     messages = _watched.messages_of(session, span, model if compute else None)
-    stream = recording.new_stream(session.path.stem)
     bare = arguments.picture is not None
-    with drawn_to(stream, url, arguments.save):
+    with drawn_to(session.path.stem, url, arguments.save) as stream:
         return recording.draw(
             messages, stream, facts, windows, lambda n: say(f"{n} samples drawn"), bare=bare
         )
