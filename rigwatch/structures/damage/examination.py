@@ -105,7 +105,7 @@ def examine(
     progress: Callable[[str], None] = lambda _: None,
     model: SpringModel | None = None,
 ) -> Examination:
-    """Look for damages in a record.
+    """Search a record for damages.
 
     Args:
         structure: the undamaged structure.
@@ -317,22 +317,17 @@ class _Search:
         return stretch.refit({**marked, **{c.name: c.after for c in ranking.changed}}, state)
 
     def _changed(self, estimate: _Estimate, refit: Refit | None) -> FloatArray:
-        parameters = estimate.parameters.copy()
-        names = list(self.base.model.problem.sweeper.compiled.system.parameters)
-        for name, value in (refit.values if refit else {}).items():
-            parameters[names.index(name)] = value
-        return parameters
+        return self.base.model.changed(estimate.parameters, refit.values if refit else {})
 
     def _taken(self, estimate: _Estimate, name: str) -> Figure:
-        names = list(self.base.model.problem.sweeper.compiled.system.parameters)
-        return Figure(float(estimate.parameters[names.index(name)]), float("nan"), float("nan"))
+        value = self.base.model.value(estimate.parameters, name)
+        return Figure(value, float("nan"), float("nan"))
 
     def _spread(self, refit: Refit) -> FloatArray:
         """The refit's covariance, expanded to all coefficients and states."""
-        known = self.base.model.candidates
-        n = len(refit.state)
-        spread = np.zeros((len(known) + n, len(known) + n))
-        at = [*(known.index(name) for name in refit.names), *range(len(known), len(known) + n)]
+        count = len(self.base.model.candidates) + len(refit.state)
+        spread = np.zeros((count, count))
+        at = self.base.model.columns(refit.names)
         spread[np.ix_(at, at)] = refit.covariance
         return spread
 

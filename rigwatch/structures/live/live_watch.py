@@ -204,7 +204,7 @@ class _UndamagedRun:
 
     def __init__(self, base: Reference, settings: LiveSettings, dt: float) -> None:
         self.model = base.model
-        system = base.model.problem.sweeper.compiled.system
+        system = base.model.problem.system
         self.units = [system.model.outputs[name].unit for name in base.model.signals]
         self._parameters = base.parameters
         self._state = base.model.start()
@@ -251,7 +251,7 @@ def _check(settings: LiveSettings) -> None:
 
 
 def _learnt(base: Reference) -> str:
-    parameters = base.model.problem.sweeper.compiled.system.parameters
+    parameters = base.model.problem.system.parameters
     units = {name: parameters[name].unit for name in base.figures if name in parameters}
     found = ", ".join(
         f"{name} = {figure.value:.6g} {units.get(name, '')}".rstrip()
