@@ -49,7 +49,7 @@ class RigSet:
         self._looked_at = time.monotonic()
 
     def look(self) -> None:
-        """Look at the files if it is time to, and act on changes."""
+        """Check the files if it is due, and act on changes."""
         for watch in self._watches.values():
             watch.look()
         now = time.monotonic()

@@ -24,7 +24,7 @@ _TIME = BASES.index("s")
 
 
 def in_table_words(text: str) -> str:
-    """The unit in the table's words; what is no unit stays as it is."""
+    """The unit in the table's words; a text that is no unit is returned unchanged."""
     written = text.strip()
     if written in ENTRIES:
         return written
