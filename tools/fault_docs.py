@@ -1,13 +1,11 @@
 """Prints docs/faults.md from tests/faults/catalogue.toml: `make docs` writes it."""
 
-import sys
 import tomllib
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parent.parent
 CATALOGUE = ROOT / "tests" / "faults" / "catalogue.toml"
-TARGET = ROOT / "docs" / "faults.md"
 INTRODUCTION = """# Faults
 
 <!-- Printed by `make docs` from tests/faults/catalogue.toml. -->
@@ -63,13 +61,3 @@ def _links(row: dict[str, Any]) -> str:
 
 def _link(path: str, name: str) -> str:
     return f"[{name.removeprefix('test_').replace('_', ' ')}](../{path})"
-
-
-def main() -> int:
-    """Write the page."""
-    TARGET.write_text(page(), encoding="utf-8")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
