@@ -74,7 +74,7 @@ def _entry(address: str) -> tuple[Store, Entry]:
 
 @contextmanager
 def _fetched(address: str) -> Iterator[tuple[Path, str, str]]:
-    """A copy of a session; the folder of the copies, and the address that it stands for."""
+    """A copy of a session; the folder of the copies, and the address that it was copied from."""
     store, entry = _entry(address)
     with store.local([file.name for file in entry.files]) as paths:
         folder = paths[0].parent

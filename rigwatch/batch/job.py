@@ -79,7 +79,7 @@ def _code(call: Callable[..., Any]) -> str:
     if isinstance(call, partial):
         return f"{_code(call.func)}{call.args}{sorted(call.keywords.items())}"
     if call.__module__.partition(".")[0] == "rigwatch":
-        return ""  # its version stands for it
+        return ""  # rigwatch's own: the version identifies it
     try:
         return inspect.getsource(call)
     except (OSError, TypeError):

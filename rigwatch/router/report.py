@@ -24,7 +24,7 @@ BETWEEN_HEALTH = 1.0
 BETWEEN_EVENTS = 60.0
 """Shortest time between two events about refusals [s]."""
 BETWEEN_LOOKS, DAY = 60.0, 86_400.0
-"""Time between two looks at the certificates' ends, and between two events about them [s]."""
+"""Time between two checks of the certificates' ends, and between two events about them [s]."""
 
 
 class RouterReport:
@@ -83,7 +83,7 @@ class RouterReport:
         if now - self._looked_at < BETWEEN_LOOKS:
             return
         self._looked_at = now
-        with contextlib.suppress(KeysError):  # whoever follows the register says so
+        with contextlib.suppress(KeysError):  # the follower of the register reports it
             register = read_register(Path(self._config.bus.security.keys))
             today = datetime.fromtimestamp(t_ns / 1e9, UTC).date()
             left = [days_left(one, today) for one in in_force(register)]

@@ -50,13 +50,13 @@ class ConfigWatch:
     ) -> None:
         self._path, self._config, self._supervisor = Path(path), config, supervisor
         self._tell, self._load, self._follow, self._clock = tell, read, follow, clock
-        self._hash, self._looked_at = hash_of(self._path), clock()
+        self._hash, self._checked_at = hash_of(self._path), clock()
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Check the file if it is due, and act on a change."""
-        if self._clock() - self._looked_at < INTERVAL:
+        if self._clock() - self._checked_at < INTERVAL:
             return
-        self._looked_at = self._clock()
+        self._checked_at = self._clock()
         found = hash_of(self._path)
         if found in (self._hash, ""):
             return

@@ -27,14 +27,14 @@ STILL_EVERY = 5.0
 """Time after which a page without news gets a sign of life [s]."""
 OLD_AFTER = 10.0
 """Time without a completed poll after which the pages say that their figures are old [s]."""
-Look = Callable[[], list[RigState]]
+States = Callable[[], list[RigState]]
 
 
 class FleetPages:
     """State of the server.
 
     Args:
-        look: returns the present state of the rigs, the worst first; may take seconds.
+        poll: returns the present state of the rigs, the worst first; may take seconds.
 
     Attributes:
         states: as last seen.
@@ -42,10 +42,10 @@ class FleetPages:
         stopping: set when the server is about to stop.
     """
 
-    def __init__(self, look: Look) -> None:
+    def __init__(self, poll: States) -> None:
         self.states: list[RigState] = []
         self.stopping = asyncio.Event()
-        self._look = look
+        self._poll = poll
         self.dashboards = Dashboards()
         self._news = asyncio.Condition()
         self._seen_at = time.monotonic()
@@ -53,7 +53,7 @@ class FleetPages:
     async def follow(self) -> None:
         """Poll the rigs, and notify the open pages."""
         while True:
-            states = await asyncio.to_thread(self._look)
+            states = await asyncio.to_thread(self._poll)
             async with self._news:
                 self.states, self._seen_at = states, time.monotonic()
                 self._news.notify_all()
@@ -64,7 +64,7 @@ class FleetPages:
         told = b""
         while True:
             if (silent := time.monotonic() - self._seen_at) > OLD_AFTER:
-                told = b""  # the next look is told whatever it shows
+                told = b""  # the next poll is sent whatever it shows
                 yield event("old", msgspec.json.encode({"seconds": round(silent)}))
             else:
                 content = msgspec.json.encode(

@@ -14,8 +14,8 @@ from rigwatch.browser.recordings import (
     begin_story,
     channels_of,
     check_session,
+    contents_of,
     import_preview,
-    look_at,
     make_study,
     new_upload,
     recordings_in,
@@ -68,18 +68,18 @@ async def bring(request: Request) -> Response:
     if not await _written(request, path, most):
         return refused(f"found more than {most >> 20} MB, expected less", 413)
     try:
-        return answer({"upload": f"{folder.name}/{name}", "look": await _looked(path)})
+        return answer({"upload": f"{folder.name}/{name}", "look": await _contents(path)})
     except RigwatchError as error:
         _gone(path)
         raise ImportDataError(str(error).replace(f"{path}", name)) from None
 
 
-async def _looked(path: Path) -> Any:
+async def _contents(path: Path) -> Any:
     """Content of an uploaded file; None for a session, which needs no mapping."""
     if path.suffix == SUFFIX:
         await run_in_threadpool(apart, check_session, path)
         return None
-    return await run_in_threadpool(apart, look_at, path)
+    return await run_in_threadpool(apart, contents_of, path)
 
 
 async def _written(request: Request, path: Path, most: int) -> bool:

@@ -1,9 +1,8 @@
 """Shared parts of commands: opening sessions, drawing, progress."""
 
-from rigwatch.commands.common import watched
+from rigwatch.commands.common.batch_options import add_many, add_on, add_where, run_many, the_one
 from rigwatch.commands.common.drawing import ready_to_draw, show_until_closed
 from rigwatch.commands.common.log_arguments import add_log_columns
-from rigwatch.commands.common.many import add_many, add_on, add_where, run_many, the_one
 from rigwatch.commands.common.many_studies import add_studies, run_studies, the_study
 from rigwatch.commands.common.marks import marks_of
 from rigwatch.commands.common.numbers import PORT, POSITIVE, number, whole
@@ -49,6 +48,5 @@ __all__ = [
     "the_one",
     "the_study",
     "unix_time",
-    "watched",
     "whole",
 ]

@@ -111,7 +111,7 @@ class Part:
         """See `RigPulse`."""
         self._out(f"{self._name}: {text}")
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Report a loop that hangs, and one that runs again."""
         at = self._turned_at
         hangs = at is not None and time.monotonic() - at > HANGS_AFTER
@@ -178,7 +178,7 @@ def run_side_by_side(
             for part in parts:
                 part.renew()
         for part in parts:
-            part.look()
+            part.check()
         waits = "no rig has samples to come" if all(part.waits for part in parts) else ""
         heartbeat.advance(sum(part.count for part in parts), waits)
     heartbeat.stopping()
