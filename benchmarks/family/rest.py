@@ -98,7 +98,7 @@ def stuck(member: Member) -> Scenario:
     return Scenario("stuck", SINE8, LENGTH_S, FULL_S, hidden)
 
 
-def told(member: Member, model: Path) -> str:
+def described(member: Member, model: Path) -> str:
     """One line: limits of rest as ranges of a motion of 8 Hz, with its largest speed."""
     pace = np.pi * SINE8.hz
     fading_motions = [seen(member, model, fading(factor)) for factor in FACTORS]
@@ -125,7 +125,7 @@ def main() -> None:
     chosen = parser.parse_args()
     for flavour in chosen.members:
         member = draw(flavour, chosen.seed)
-        print(told(member, commissioned(chosen.folder / member.name, member)), flush=True)
+        print(described(member, commissioned(chosen.folder / member.name, member)), flush=True)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from rigwatch.router.refusal_log import RefusalLog
-from rigwatch.wire.access import days_left, ending_soon, in_force, read_register, told
+from rigwatch.wire.access import days_left, ending_soon, endings_text, in_force, read_register
 from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.errors import KeysError, RigwatchError
 from rigwatch.wire.messages import EVENTS, HEALTH, Event, Health
@@ -91,4 +91,4 @@ class RouterReport:
             soon = ending_soon(register, today)
             if soon and now - self._warned_at >= DAY:
                 self._warned_at = now
-                yield Event(PROCESS, t_ns, "error", "CERTIFICATES END", told(soon))
+                yield Event(PROCESS, t_ns, "error", "CERTIFICATES END", endings_text(soon))

@@ -64,7 +64,7 @@ def answer(value: Any, status: int = 200) -> Response:
 Handler = Callable[[Request], Awaitable[Response]]
 
 
-def told(handler: Handler) -> Handler:
+def errors_answered(handler: Handler) -> Handler:
     """A handler whose user errors become a one-line response."""
 
     @wraps(handler)

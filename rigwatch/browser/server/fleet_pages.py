@@ -61,17 +61,17 @@ class FleetPages:
 
     async def events(self) -> AsyncGenerator[bytes, None]:
         """The rigs now, and whenever something has changed; how old they are if polls stall."""
-        told = b""
+        sent = b""
         while True:
             if (silent := time.monotonic() - self._seen_at) > OLD_AFTER:
-                told = b""  # the next poll is sent whatever it shows
+                sent = b""  # the next poll is sent whatever it shows
                 yield event("old", msgspec.json.encode({"seconds": round(silent)}))
             else:
                 content = msgspec.json.encode(
                     {"summary": summary(self.states), "html": as_part(self.states)}
                 )
-                yield STILL_HERE if content == told else event("rigs", content)
-                told = content
+                yield STILL_HERE if content == sent else event("rigs", content)
+                sent = content
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(STILL_EVERY), self._news:
                     await self._news.wait()

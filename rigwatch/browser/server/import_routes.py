@@ -27,9 +27,9 @@ from rigwatch.browser.server.context import (
     answer,
     body_of,
     context_of,
+    errors_answered,
     number_of,
     refused,
-    told,
 )
 from rigwatch.browser.server.places import MODELS, RECORDINGS, UPLOADS, PlaceError
 from rigwatch.browser.server.signal_routes import packed, span_of
@@ -239,13 +239,13 @@ async def story(request: Request) -> Response:
 
 ROUTES = [
     Route("/new", new_page),
-    Route("/api/upload/{file}", told(bring), methods=["PUT"]),
-    Route("/api/import", told(take_in), methods=["POST"]),
-    Route("/api/import-preview", told(preview), methods=["POST"]),
-    Route("/api/recordings", told(recordings)),
-    Route("/api/recording/{file:path}", told(recording)),
-    Route("/api/recording-signals/{file:path}", told(recording_signals)),
-    Route("/api/template/{template}", told(template)),
-    Route("/api/new", told(make), methods=["POST"]),
-    Route("/api/story/{story}", told(story), methods=["POST"]),
+    Route("/api/upload/{file}", errors_answered(bring), methods=["PUT"]),
+    Route("/api/import", errors_answered(take_in), methods=["POST"]),
+    Route("/api/import-preview", errors_answered(preview), methods=["POST"]),
+    Route("/api/recordings", errors_answered(recordings)),
+    Route("/api/recording/{file:path}", errors_answered(recording)),
+    Route("/api/recording-signals/{file:path}", errors_answered(recording_signals)),
+    Route("/api/template/{template}", errors_answered(template)),
+    Route("/api/new", errors_answered(make), methods=["POST"]),
+    Route("/api/story/{story}", errors_answered(story), methods=["POST"]),
 ]

@@ -16,8 +16,8 @@ from rigwatch.browser.server.context import (
     Context,
     answer,
     context_of,
+    errors_answered,
     number_of,
-    told,
 )
 from rigwatch.browser.server.places import PlaceError
 from rigwatch.browser.views import AtRig, candidate_html, parts_of, render, state_of
@@ -109,9 +109,9 @@ def job_data(job: Job | None) -> dict[str, Any] | None:
 
 FILES = {"report": "report.html", "experiment": "experiment.csv"}
 ROUTES = [
-    Route("/api/file/report/{name:path}", told(study_file)),
-    Route("/api/file/experiment/{name:path}", told(study_file)),
+    Route("/api/file/report/{name:path}", errors_answered(study_file)),
+    Route("/api/file/experiment/{name:path}", errors_answered(study_file)),
     Route("/study/{name:path}", study_page),
-    Route("/api/parts/{name:path}", told(study_parts)),
-    Route("/api/candidate/{name:path}", told(study_candidate)),
+    Route("/api/parts/{name:path}", errors_answered(study_parts)),
+    Route("/api/candidate/{name:path}", errors_answered(study_candidate)),
 ]

@@ -200,15 +200,15 @@ class _Search:
         places = [f"{c.name}: {c.before:g} -> {c.after:g}" for c in ranking.changed]
         self.progress(f"most likely {' and '.join(places)}")
         when = instant(model, self._changed(estimate, best.refit), watch, alarm, self.base.sigma)
-        refit = self._refitted(estimate, path, ranking, when.sample)
+        first = max(ranking.first, min(when.sample, ranking.last - SHORTEST))
+        refit = self._refitted(estimate, path, ranking, first)
         figures = _figures(refit)
         before = {n: estimate.figures.get(n, self._taken(estimate, n)) for n in figures}
         self.damages.append(
             Damage(alarm.sample * dt, when, ranking, figures, before, explained, ranking.last * dt)
         )
-        follow = max(ranking.first, min(when.sample, ranking.last - SHORTEST))
         return _Estimate(
-            self._changed(estimate, refit), refit.state, follow, self._spread(refit),
+            self._changed(estimate, refit), refit.state, first, self._spread(refit),
             {**estimate.figures, **figures}, ranking.last,
         )  # fmt: skip
 
@@ -306,11 +306,10 @@ class _Search:
         return watch.alarm is None
 
     def _refitted(
-        self, estimate: _Estimate, path: FloatArray, ranking: Ranking, onset: int
+        self, estimate: _Estimate, path: FloatArray, ranking: Ranking, first: int
     ) -> Refit:
-        """The changed coefficient and those marked in the file, from the instant on."""
+        """The changed coefficient and those marked in the file, from sample `first` on."""
         best, known = ranking.best, self.base.model.candidates
-        first = max(ranking.first, min(onset, ranking.last - SHORTEST))
         marked = {n: f.value for n, f in estimate.figures.items() if n in known}
         state = path[first] if best.refit is None or first != ranking.first else best.refit.state
         stretch = self._stretch(estimate, first, ranking.last)
