@@ -69,15 +69,8 @@ bench: $(STAMPS)/bench  ## run the benchmarks (BENCH names some) and write docs/
 	@python -m benchmarks --page $(BENCH)
 
 docs: $(STAMPS)/run  ## write the pages, tables and pictures that are made by the code
-	@python -m tools.config_docs
-	@python -m tools.command_docs
-	@python -m tools.format_docs
-	@python -m tools.effect_docs
-	@python -m tools.alarm_docs
-	@python -m tools.fault_docs
-	@python -m tools.unit_docs
+	@python -m tools.docs
 	@python -m tools.pictures
-	@python -m tools.benchmark_page
 
 sbom: $(STAMPS)/dev  ## software bill of materials (CycloneDX) of what is installed, in dist/rigwatch.cdx.json
 	@python -m tools.supply_chain.sbom dist/rigwatch.cdx.json

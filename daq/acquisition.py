@@ -19,7 +19,6 @@ from rigwatch.wire.messages import (
     Event,
     Gap,
     Message,
-    SampleBlock,
     Severity,
     pieces,
 )
@@ -108,15 +107,11 @@ class Acquisition:
                 text = f"the device's clock jumped by {jump:+.6f} s, its time is anchored anew"
                 messages.append(self._event(int(part.arrived_ns[0]), "warning", "clock_jump", text))
             block = self.conditioner.condition(part, stamps)
-            counted = self._counted(block, int(part.arrived_ns[-1]))
+            self.samples += len(block)
+            self.watch.saw(block, int(part.arrived_ns[-1]), self.clock.unix_ns(0))
             self._most = self._most or BlockSize.of(block).samples_in(MAX_PAYLOAD)
-            messages += pieces(counted, self._most)
+            messages += pieces(block, self._most)
         return messages
-
-    def _counted(self, block: SampleBlock, arrived_ns: int) -> SampleBlock:
-        self.samples += len(block)
-        self.watch.saw(block, arrived_ns, self.clock.unix_ns(0))
-        return block
 
     def _restarted(self, restart: Restart, now_ns: int) -> list[Message]:
         self.clock.restart()

@@ -4,25 +4,7 @@ from collections.abc import Iterable
 
 from rigwatch.wire.bus import Bus
 from rigwatch.wire.delivery import SampleRing
-from rigwatch.wire.messages import (
-    EVENTS,
-    GAPS,
-    HEALTH,
-    SAMPLES,
-    Event,
-    Gap,
-    Health,
-    Message,
-    SampleBlock,
-    Topic,
-)
-
-_TOPICS: dict[type[Message], Topic] = {
-    SampleBlock: SAMPLES,
-    Gap: GAPS,
-    Event: EVENTS,
-    Health: HEALTH,
-}
+from rigwatch.wire.messages import Message, SampleBlock, topic_of
 
 
 class Publisher:
@@ -42,4 +24,4 @@ class Publisher:
         for message in messages:
             if isinstance(message, SampleBlock):
                 self._ring.add(message)
-            self._bus.publish(_TOPICS[type(message)], message)
+            self._bus.publish(topic_of(message), message)

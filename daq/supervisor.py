@@ -26,7 +26,6 @@ class Supervisor:
         connected: whether the device is open.
         text: the problem, empty if there is none.
         reconnects: how often it was reopened after a loss.
-        losses: how often it was lost.
     """
 
     def __init__(
@@ -39,7 +38,6 @@ class Supervisor:
         self.connected = False
         self.text = "not opened yet"
         self.reconnects = 0
-        self.losses = 0
         self._clock = clock
         self._sleep = sleep
         self._wait = _FIRST_WAIT
@@ -99,7 +97,6 @@ class Supervisor:
         self._ever_open = True
 
     def _lose(self, error: Exception) -> None:
-        self.losses += self.connected
         self.connected = False
         self.adapter.close()
         self.text = str(error)

@@ -18,7 +18,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 
 Step = Callable[[], bool]
-"""One reading of a device; whether it shall go on."""
+"""One reading of a device; returns whether to continue."""
 PART = 16
 """Rigs in a part of a turn, at least, if there are so many."""
 SHORTEST_PART = 0.005

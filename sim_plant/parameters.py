@@ -5,14 +5,13 @@ others are marked "chosen": they reproduce the frequency response, the amplitude
 accelerations of the thesis, within the range of such parts.
 """
 
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from msgspec import Meta, structs
 from numpy.typing import NDArray
 
-from rigwatch.wire.typed_files import Section, load
+from rigwatch.wire.typed_files import Section
 
 INCH = 0.0254
 """[m]"""
@@ -114,11 +113,6 @@ class RigParameters(Section, frozen=True, kw_only=True):
         return self.piston_area - float(np.pi * self.rod**2 / 4)
 
     @property
-    def moving_mass(self) -> float:
-        """Piston, rod and load [kg]."""
-        return self.piston_mass + self.load_mass
-
-    @property
     def volts_per_code(self) -> NDArray[np.float64]:
         """Of the three converters: voltage, position, acceleration [V]."""
         return np.array([self.adc_range, self.adc_range, self.adc_range_acceleration]) / 32768.0
@@ -128,15 +122,6 @@ class RigParameters(Section, frozen=True, kw_only=True):
         """Calibration of the three channels [V, m, m/s^2 per code]."""
         gains = np.array([1.0, self.lvdt_gain, self.accelerometer_gain])
         return np.asarray(self.volts_per_code / gains, dtype=np.float64)
-
-
-def load_parameters(path: Path | str) -> RigParameters:
-    """The plant file at `path`.
-
-    Raises:
-        ConfigError: the file does not fit.
-    """
-    return load(path, RigParameters)
 
 
 def as_record(parameters: RigParameters) -> NDArray[np.void]:

@@ -53,7 +53,6 @@ class Validation:
     input: Floats
     acceleration_healthy: Floats
     acceleration_faulty: Floats
-    velocity_faulty: Floats
     acceleration_measured: Floats
     velocity_measured: Floats
 
@@ -68,7 +67,6 @@ def validation(case: int, seed: int) -> Validation:
         input=_input(time),
         acceleration_healthy=healthy[:, 2],
         acceleration_faulty=faulty[:, 2],
-        velocity_faulty=faulty[:, 1],
         acceleration_measured=_noisy(faulty[:, 2], time, random),
         velocity_measured=_noisy(faulty[:, 1], time, random),
     )

@@ -1,11 +1,10 @@
 """Prints the table of docs/alarms.md from `monitor/alarms/kinds.py`: `make docs` writes it."""
 
-import sys
 from pathlib import Path
 
 from monitor.alarms.kinds import ALARM_KINDS, AlarmKind
 
-TARGET = Path(__file__).parent.parent / "docs" / "alarms.md"
+PAGE = Path(__file__).parent.parent / "docs" / "alarms.md"
 BEGIN = "<!-- Printed by `make docs` from monitor/alarms/kinds.py. -->\n"
 END = "<!-- End of the printed table. -->\n"
 HEADINGS = ("alarm", "severity", "persistence", "clear after", "latch", "cause", "what to do")
@@ -13,7 +12,7 @@ HEADINGS = ("alarm", "severity", "persistence", "clear after", "latch", "cause",
 
 def page() -> str:
     """The whole page: the text as it stands, with the table as the code has it."""
-    before, _, rest = TARGET.read_text(encoding="utf-8").partition(BEGIN)
+    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
     _, _, after = rest.partition(END)
     return f"{before}{BEGIN}\n{table()}\n{END}{after}"
 
@@ -35,13 +34,3 @@ def _cells(kind: AlarmKind) -> tuple[str, ...]:
         kind.cause,
         kind.guidance,
     )
-
-
-def main() -> int:
-    """Write the page."""
-    TARGET.write_text(page(), encoding="utf-8")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

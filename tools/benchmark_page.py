@@ -41,7 +41,6 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
         (
             "latency",
             "notification",
-            "losses",
             "random_kills",
             "rogue_client",
             "fuzzing",
@@ -164,7 +163,3 @@ def _described(machine: Mapping[str, str]) -> str:
 def write(results: Mapping[str, Measured] | None = None) -> None:
     """Write the page."""
     PAGE.write_text(page(results), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    write()

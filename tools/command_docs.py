@@ -1,14 +1,11 @@
 """Prints docs/commands.md from the commands' own help: `make docs` writes it."""
 
 import inspect
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from types import ModuleType
 
 from rigwatch.commands import every_command
 
-TARGET = Path(__file__).parent.parent / "docs" / "commands.md"
 HEAD = """<!-- Printed by `make docs` from the commands' own help. -->
 
 # Commands
@@ -29,13 +26,3 @@ def _command(name: str, module: ModuleType) -> Iterator[str]:
     yield f"{module.HELP[0].upper()}{module.HELP[1:]}."
     if not hasattr(module, "ACTIONS"):  # else its sub-commands follow, each with its examples
         yield f"\n```\n{inspect.cleandoc(module.EXAMPLE)}\n```"
-
-
-def main() -> int:
-    """Write the page."""
-    TARGET.write_text(page(), encoding="utf-8")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -5,9 +5,7 @@ page cannot say anything else than the program does.
 """
 
 import math
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, cast
 
 import msgspec
@@ -18,7 +16,6 @@ from rigwatch.wire.typed_files.loading import Section
 from rigwatch.witness.people import PeopleFile
 from sim_plant.scenario import Scenario
 
-TARGET = Path(__file__).parent.parent / "docs" / "configuration.md"
 PAGES: tuple[tuple[str, str, type[Section]], ...] = (
     (
         "Configuration of a rig",
@@ -202,17 +199,3 @@ def _default(field: inspect.Field) -> str:
     if field.default in (None, math.inf, -math.inf):
         return "none"
     return f"`{msgspec.json.encode(field.default).decode()}`"
-
-
-def main() -> int:
-    """Write the page."""
-    missing = undocumented()
-    if missing:
-        print(f"without a description: {', '.join(missing)}", file=sys.stderr)
-        return 1
-    TARGET.write_text(page(), encoding="utf-8")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,12 +1,8 @@
 """Prints docs/effects.md from the library of effects: `make docs` writes it."""
 
-import sys
-from pathlib import Path
-
 from rigwatch.physics.engine.equations import library
 from rigwatch.workbench.catalogue import listed, markdown
 
-TARGET = Path(__file__).parent.parent / "docs" / "effects.md"
 HEAD = """<!-- Printed by `make docs` from rigwatch/physics/effects. -->
 
 # Effects of the library
@@ -28,13 +24,3 @@ ports that have all its variables.
 def page() -> str:
     """The whole page."""
     return HEAD.format(count=len(library())) + markdown(listed())
-
-
-def main() -> int:
-    """Write the page."""
-    TARGET.write_text(page(), encoding="utf-8")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,13 +1,11 @@
 """Prints docs/faults.md from tests/faults/catalogue.toml: `make docs` writes it."""
 
-import sys
 import tomllib
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parent.parent
 CATALOGUE = ROOT / "tests" / "faults" / "catalogue.toml"
-TARGET = ROOT / "docs" / "faults.md"
 INTRODUCTION = """# Faults
 
 <!-- Printed by `make docs` from tests/faults/catalogue.toml. -->
@@ -46,13 +44,3 @@ def _links(row: dict[str, Any]) -> str:
     """The files of a row's tests, each once."""
     paths = dict.fromkeys(test.partition("::")[0] for test in tests_of(row))
     return "<br>".join(f"[{Path(path).stem}](../{path})" for path in paths)
-
-
-def main() -> int:
-    """Write the page."""
-    TARGET.write_text(page(), encoding="utf-8")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,8 +1,6 @@
 """Prints docs/file-formats.md from the structs that read the files: `make docs` writes it."""
 
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 from rigwatch.physics.engine.equations import Composite, Effect, EffectMap, Model
 from rigwatch.replay.cases import CaseFile
@@ -12,7 +10,6 @@ from rigwatch.wire.typed_files import Section
 from rigwatch.workbench.study import StudyFile
 from tools.config_docs import sections
 
-TARGET = Path(__file__).parent.parent / "docs" / "file-formats.md"
 HEAD = """<!-- Printed by `make docs` from the descriptions in the code. -->
 
 # File formats
@@ -84,13 +81,3 @@ def page() -> str:
 def _file(title: str, text: str, kind: type[Section], printed: set[type[Section]]) -> Iterator[str]:
     yield f"\n## {title}\n\n{text}\n"
     yield from sections(kind, 3, printed)
-
-
-def main() -> int:
-    """Write the page."""
-    TARGET.write_text(page(), encoding="utf-8")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,13 +1,10 @@
 """Prints docs/units.md from the table that every file is read with: `make docs` writes it."""
 
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 from rigwatch.wire.units import describe, unit_of
 from rigwatch.wire.units.unit_table import PREFIXES, QUANTITIES
 
-TARGET = Path(__file__).parent.parent / "docs" / "units.md"
 HEAD = """<!-- Printed by `make docs` from the table in the code. -->
 
 # Units
@@ -59,13 +56,3 @@ def _other(name: str) -> str:
 
 def _prefixes() -> str:
     return ", ".join(f"`{name}` {float(size):g}" for name, size in PREFIXES.items())
-
-
-def main() -> int:
-    """Write the page."""
-    TARGET.write_text(page(), encoding="utf-8")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

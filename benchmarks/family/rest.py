@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.family.rig_folder import CHANNELS, RigFolder, command
+from benchmarks.family.rig_folder import CHANNELS, RigFolder
 from monitor.model import load_model
 from monitor.pipeline import RigMonitor
 from rigwatch.wire.messages import Column, SampleBlock
@@ -48,12 +48,7 @@ def commissioned(folder: Path, member: Member) -> Path:
         write_rig(folder, member, ("watch",))
     rig = RigFolder(folder, folder / "work")
     model = rig.work / "model.toml"
-    words: list[Any] = ["commission", "--output", model, "--chirp", rig.session("watch", "chirp")]
-    for name in rig.truth("watch"):
-        role = name.partition("_")[0]
-        if role in {"healthy", "friction"} and not name.endswith("_free"):
-            words += [f"--{role}", rig.session("watch", name)]
-    if not model.exists() and (run := command(*words)).returncode:
+    if not model.exists() and (run := rig.commission(model)).returncode:
         raise RuntimeError(run.stderr.strip()[-300:])
     return model
 
@@ -103,7 +98,7 @@ def stuck(member: Member) -> Scenario:
     return Scenario("stuck", SINE8, LENGTH_S, FULL_S, hidden)
 
 
-def told(member: Member, model: Path) -> str:
+def described(member: Member, model: Path) -> str:
     """One line: limits of rest as ranges of a motion of 8 Hz, with its largest speed."""
     pace = np.pi * SINE8.hz
     fading_motions = [seen(member, model, fading(factor)) for factor in FACTORS]
@@ -130,7 +125,7 @@ def main() -> None:
     chosen = parser.parse_args()
     for flavour in chosen.members:
         member = draw(flavour, chosen.seed)
-        print(told(member, commissioned(chosen.folder / member.name, member)), flush=True)
+        print(described(member, commissioned(chosen.folder / member.name, member)), flush=True)
 
 
 if __name__ == "__main__":

@@ -61,10 +61,10 @@ def _scores(
     return scores
 
 
-def _flavours(wished: list[str]) -> list[str]:
+def _flavours(chosen: list[str]) -> list[str]:
     """Flavours of the groups and flavours named; all if none is named."""
-    wished = wished or list(GROUPS)
-    return [name for name, kind in FLAVOURS.items() if name in wished or kind.group in wished]
+    chosen = chosen or list(GROUPS)
+    return [name for name, kind in FLAVOURS.items() if name in chosen or kind.group in chosen]
 
 
 def _parser() -> argparse.ArgumentParser:

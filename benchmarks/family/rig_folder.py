@@ -76,6 +76,15 @@ class RigFolder:
                 raise RuntimeError(f"import {source}: {run.stderr.strip()}")
         return session
 
+    def commission(self, model: Path) -> subprocess.CompletedProcess[str]:
+        """`rigwatch commission` from the chirp and all recordings with a locked generator."""
+        words: list[str | Path] = ["--chirp", self.session("watch", "chirp")]
+        for name in self.truth("watch"):
+            role = name.partition("_")[0]
+            if role in {"healthy", "friction"} and not name.endswith("_free"):
+                words += [f"--{role}", self.session("watch", name)]
+        return command("commission", "--output", model, *words)
+
 
 def command(*words: str | Path) -> subprocess.CompletedProcess[str]:
     """Runs `rigwatch` with these arguments."""

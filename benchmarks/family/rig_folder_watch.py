@@ -8,7 +8,7 @@ import statistics
 from dataclasses import dataclass, field
 from typing import Any
 
-from benchmarks.family.rig_folder import RigFolder, Tally, answer, command
+from benchmarks.family.rig_folder import RigFolder, Tally, answer
 
 FRICTION = ("dry_friction", "stiction")
 ALARM = ("departure", "other_fault", *FRICTION)
@@ -52,12 +52,7 @@ def watched(rig: RigFolder) -> Watched:
     truth = rig.truth("watch")
     model = rig.work / "model.toml"
     model.unlink(missing_ok=True)
-    words: list[Any] = ["commission", "--output", model, "--chirp", rig.session("watch", "chirp")]
-    for name in truth:
-        role = name.partition("_")[0]
-        if role in {"healthy", "friction"} and not name.endswith("_free"):
-            words += [f"--{role}", rig.session("watch", name)]
-    run = command(*words)
+    run = rig.commission(model)
     if run.returncode:
         found.lines.append(f"commission: {run.stderr.strip()[-300:]}")
     for name, told in truth.items():

@@ -49,7 +49,7 @@ class Recording:
     """The messages of one reader, in order.
 
     Attributes:
-        began_ns, ended_ns: Unix time of its start, and of its end if it says so [ns].
+        began_ns, ended_ns: Unix time of its start, and of its end if it reports one [ns].
     """
 
     began_ns: int

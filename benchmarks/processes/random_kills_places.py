@@ -25,7 +25,7 @@ def changes_of(records: list[AlarmRecord]) -> list[Alarm]:
 
 
 def key_of(alarm: Alarm) -> tuple[str, str, int]:
-    """What tells a change of state from all others."""
+    """What distinguishes a change of state from all others."""
     return alarm.name, alarm.state, alarm.t_ns
 
 

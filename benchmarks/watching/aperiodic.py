@@ -40,11 +40,11 @@ _NAMES = (DRY_FRICTION, STICTION, OTHER_FAULT, EXCITATION_CHANGED)
 
 @dataclass(frozen=True)
 class Noticed:
-    """Delay until friction of one level was detected, over all seeds [s]; None if it was not."""
+    """Delay until friction was detected [s], None if never; whether it was named, alarmed early."""
 
-    delays: list[float | None]
-    named: int
-    early: int
+    delay: float | None
+    named: bool
+    early: bool
 
 
 def drives() -> dict[str, Excitation]:
@@ -105,7 +105,7 @@ def _quiet(name: str, drive: Excitation, hours: float) -> Row:
 def _noticed(name: str, drive: Excitation, level: float, seeds: int) -> Row:
     draw = np.random.default_rng(9100)
     outcomes = [_outcome(drive, level, float(draw.uniform(30.0, 50.0)), k) for k in range(seeds)]
-    found = sorted(one for one in (o.delays[0] for o in outcomes) if one is not None)
+    found = sorted(o.delay for o in outcomes if o.delay is not None)
     named, early = sum(o.named for o in outcomes), sum(o.early for o in outcomes)
     times = f"median {np.median(found):.1f} s, worst {found[-1]:.1f} s" if found else "never"
     return Row(
@@ -123,4 +123,4 @@ def _outcome(drive: Excitation, level: float, onset: float, seed: int) -> Notice
     results = watched(case, 9200 + seed)
     named = any(active(results, kind).any() for kind in _NAMES)
     early = bool(active(results, DEPARTURE)[: int(onset * RATE)].any())
-    return Noticed([delay(results, DEPARTURE, onset)], int(named), int(early))
+    return Noticed(delay(results, DEPARTURE, onset), named, early)

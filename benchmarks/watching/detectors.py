@@ -4,25 +4,18 @@ All four run in one monitor on the same samples with the same persistence, calib
 file. A delay is counted from the onset of the fault to the sample that raises the alarm.
 """
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import numpy as np
 from msgspec import structs
 
-from monitor.commissioning.commission import commission
+from benchmarks.watching.rig import RATE, blocks, commissioned, scenario
 from monitor.detectors import DETECTORS
 from monitor.detectors.selection import detectors_of
-from monitor.model.model_file import RigModel
-from monitor.pipeline.rig_monitor import RigMonitor
-from monitor.signals.recordings import recording_of
-from rigwatch.wire.messages.message_types import Alarm, Column, SampleBlock
-from sim_plant.scenario import Event, Scenario, ScenarioRun, load_scenario
+from monitor.model import RigModel
+from monitor.pipeline import RigMonitor
+from rigwatch.wire.messages import Alarm
+from sim_plant.scenario import Event, Scenario
 from tools.benchmark_table import Row
 
-SCENARIOS = Path(__file__).parents[2] / "configs" / "scenarios"
-RATE = 256.0
-CHANNELS = (("voltage", "V"), ("position", "m"), ("acceleration", "m/s^2"))
 SCHEMES = {
     "departure": "friction scheme",
     "parity_arma": "ARMA",
@@ -47,7 +40,7 @@ FAULT_S, END_S = 12.0, 20.0
 
 def run(quick: bool) -> list[Row]:
     """Delays by fault, and false alarms by detector."""
-    model = _model()
+    model = commissioned()
     seeds = range(40, 42) if quick else range(40, 45)
     rows = [_fault_row(model, *fault, list(seeds)) for fault in FAULTS]
     return rows + _false_alarm_rows(model, minutes=5 if quick else 120)
@@ -57,8 +50,8 @@ def _fault_row(model: RigModel, effect: str, value: float, what: str, seeds: lis
     delays: dict[str, list[float]] = {name: [] for name in SCHEMES}
     for seed in seeds:
         event = Event(at_s=FAULT_S, effect=effect, value=value)
-        scenario = structs.replace(_healthy(), events=(event,))
-        for name, seq in _raised(model, scenario, END_S, seed).items():
+        faulty = structs.replace(_healthy(END_S), events=(event,))
+        for name, seq in _raised(model, faulty, seed).items():
             delays[name].append((seq / RATE - FAULT_S) * 1e3)
     measured = "; ".join(
         f"{label} {_delay(delays[name], len(seeds))}" for name, label in SCHEMES.items()
@@ -75,7 +68,7 @@ def _delay(delays: list[float], runs: int) -> str:
 
 
 def _false_alarm_rows(model: RigModel, minutes: int) -> list[Row]:
-    raised = _raised(model, _healthy(), 60.0 * minutes, seed=77)
+    raised = _raised(model, _healthy(60.0 * minutes), seed=77)
     return [
         Row(
             f"false alarms of a healthy rig: {label}",
@@ -89,56 +82,19 @@ def _false_alarm_rows(model: RigModel, minutes: int) -> list[Row]:
     ]
 
 
-def _raised(model: RigModel, scenario: Scenario, seconds: float, seed: int) -> dict[str, int]:
+def _healthy(seconds: float) -> Scenario:
+    return scenario("healthy_sine_8hz_1v4").healthy(seconds)
+
+
+def _raised(model: RigModel, case: Scenario, seed: int) -> dict[str, int]:
     """Sample that first raised each scheme's alarm, by scheme; one raised before a fault counts."""
     names = tuple(kind.name for kind in DETECTORS)
     watching = RigMonitor(model, detectors=detectors_of(names, model, "benchmark"))
     first: dict[str, int] = {}
-    for block in _blocks(scenario, seconds, seed):
+    for block in blocks(case, seed):
         watched = watching.update(block)
         for said in watched.announcements if watched else ():
             if isinstance(said, Alarm) and said.state == "unacknowledged":
                 name = NAMED[0] if said.name in NAMED else said.name
                 first.setdefault(name, said.seq)
     return {name: seq for name, seq in first.items() if name in SCHEMES}
-
-
-def _blocks(scenario: Scenario, seconds: float, seed: int) -> Iterator[SampleBlock]:
-    """Calibrated blocks of up to 16 s."""
-    running, left, first = ScenarioRun(scenario, seed), round(seconds * RATE), 0
-    while left > 0:
-        signals = _calibrated(scenario, running, min(left, 4096))
-        n = len(signals)
-        t_ns = (first + np.arange(n, dtype=np.int64)) * 3_906_250
-        columns = tuple(
-            Column(name, unit, np.ascontiguousarray(signals[:, i]), np.zeros(n, np.uint8))
-            for i, (name, unit) in enumerate(CHANNELS)
-        )
-        yield SampleBlock("rig", 1, first, t_ns // 1000, t_ns, columns)
-        left, first = left - n, first + n
-
-
-def _calibrated(scenario: Scenario, running: ScenarioRun, n: int) -> np.ndarray:
-    plant = scenario.plant
-    gains = np.array([1.0, plant.lvdt_gain, plant.accelerometer_gain])
-    signals: np.ndarray = running.advance(n).codes * (np.array(plant.volts_per_code) / gains)
-    return signals
-
-
-def _healthy() -> Scenario:
-    return load_scenario(SCENARIOS / "healthy_sine_8hz_1v4.toml").healthy(np.inf)
-
-
-def _model() -> RigModel:
-    recordings = []
-    for role, name in (
-        ("chirp", "commissioning_chirp"),
-        ("healthy", "healthy_sine_8hz_1v4"),
-        ("friction", "known_friction"),
-    ):
-        scenario = load_scenario(SCENARIOS / f"{name}.toml")
-        running = ScenarioRun(scenario, 1)
-        signals = _calibrated(scenario, running, running.samples or 0)
-        columns = {channel: signals[:, i] for i, (channel, _) in enumerate(CHANNELS)}
-        recordings.append(recording_of(role, name, RATE, columns))  # type: ignore[arg-type]
-    return commission(recordings)

@@ -57,7 +57,7 @@ class Outcome:
 
     @property
     def in_class(self) -> bool:
-        """Whether the first or what it cannot be told from is right."""
+        """Whether the first, or one that it cannot be distinguished from, is right."""
         together = {self.named, *(self.rows[0].alike if self.rows else ())}
         return self.named != "cannot tell" and bool(together & set(RIGHT[self.fault]))
 

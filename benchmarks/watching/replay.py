@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from benchmarks.archives.recordings import MODEL, ROOT, SCENARIO
 from monitor.model.model_file import load_model
 from monitor.pipeline.rig_monitor import RigMonitor, compile_kernels
 from rigwatch.replay.cases import load_cases, replayed
@@ -22,10 +23,7 @@ from rigwatch.wire.messages.protobuf import encode
 from rigwatch.wire.session import SessionWriter, open_session, run_info
 from tools.benchmark_table import Row
 
-ROOT = Path(__file__).parents[2]
-SCENARIO = ROOT / "configs" / "scenarios" / "healthy_sine_8hz_1v4.toml"
 CASES = ROOT / "tests" / "verify" / "cases.toml"
-MODEL = CASES.parent / "model.toml"
 FLUSH = 102
 """Samples in one flush of the recorder: 0.4 s."""
 REPEATS = 3

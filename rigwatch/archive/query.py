@@ -22,7 +22,7 @@ _END = datetime(9999, 1, 1, tzinfo=UTC)
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """What a query may take.
+    """Limits of a query.
 
     Attributes:
         rows: most rows of an answer.

@@ -14,9 +14,10 @@ import msgspec
 from rigwatch.archive.entry import Entry, entries
 from rigwatch.archive.indexing import outside_index
 from rigwatch.archive.store import Store
-from rigwatch.batch import as_json, content_hash, is_address
+from rigwatch.batch import content_hash, is_address
 from rigwatch.wire.errors import ArchiveError, RigwatchError
 from rigwatch.wire.session import SUFFIX, is_segment
+from rigwatch.wire.typed_files import as_json
 
 
 def sessions_at(address: str) -> list[str]:
@@ -73,7 +74,7 @@ def _entry(address: str) -> tuple[Store, Entry]:
 
 @contextmanager
 def _fetched(address: str) -> Iterator[tuple[Path, str, str]]:
-    """A copy of a session; the folder of the copies, and the address that it stands for."""
+    """A copy of a session; the folder of the copies, and the address that it was copied from."""
     store, entry = _entry(address)
     with store.local([file.name for file in entry.files]) as paths:
         folder = paths[0].parent
@@ -101,7 +102,7 @@ class Anywhere:
             return self.call(Path(place), **settings)
         with _fetched(place) as (path, folder, stands_for):
             try:
-                value = as_json(self.call(path, **settings))
+                value = as_json(self.call(path, **settings), sort_keys=True)
             except RigwatchError as error:
                 error.args = (str(error).replace(folder, stands_for),)
                 raise

@@ -1,7 +1,7 @@
 """Removes old sessions of an archive, by the rules that the recorder has for its own.
 
-Only what the catalogue knows as it is goes: a session that is new, has changed, is still being
-recorded or could not be read stays. So does one whose age is not known, such as a log that was
+Only sessions that match the catalogue are removed: one that is new, has changed, is still being
+recorded or could not be read stays. So does one whose age is unknown, such as a log that was
 imported without the time of its start.
 """
 

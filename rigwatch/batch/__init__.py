@@ -8,14 +8,13 @@ such as "local:4" into an executor, `expand` turns paths, globs and folders into
 
 from rigwatch.batch.executors import executor_on
 from rigwatch.batch.expand import expand, is_address, recording_at
-from rigwatch.batch.job import Job, Outcome, as_json, content_hash, job_of
+from rigwatch.batch.job import Job, Outcome, content_hash, job_of
 from rigwatch.batch.mapping import Results, map_recordings, map_units
 
 __all__ = [
     "Job",
     "Outcome",
     "Results",
-    "as_json",
     "content_hash",
     "executor_on",
     "expand",

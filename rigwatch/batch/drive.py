@@ -70,7 +70,7 @@ class Drive:
             self._fill()
 
     def _forgotten(self) -> Iterator[Outcome]:
-        """Tasks of a pool that broke and took them along unsaid."""
+        """Units of tasks that a broken pool lost without reporting them."""
         if not self._pool.workers:
             self._say("no worker is left: waiting for one")
         self._pool.check()

@@ -2,16 +2,15 @@
 
 import multiprocessing
 import os
-import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing import connection
 from pathlib import Path
 from typing import Any, TypeVar
 
 from rigwatch.batch.dask_clients import client_at, client_of
 from rigwatch.wire.errors import BatchError
+from rigwatch.wire.host import end_with_parent
 
 T = TypeVar("T")
 EXPECTED = "local:4, dask://host:8786 or cluster.toml"
@@ -46,19 +45,11 @@ def preload(module: str) -> None:
 def _begin(environment: dict[str, str]) -> None:
     """Take the client's present environment, and end with it.
 
-    Workers come from a process that began with an older environment. A client that is killed
-    cannot tell its workers: they watch it.
+    Workers come from a process that began with an older environment.
     """
     os.environ.clear()
     os.environ.update(environment)
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_watch, args=(parent.sentinel,), daemon=True).start()
-
-
-def _watch(sentinel: int) -> None:
-    connection.wait([sentinel])
-    os._exit(1)
+    end_with_parent()
 
 
 @contextmanager

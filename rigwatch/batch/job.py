@@ -17,6 +17,7 @@ import msgspec
 
 from rigwatch.version import __version__
 from rigwatch.wire.errors import BatchError, RigwatchError, reason_of
+from rigwatch.wire.typed_files import as_json
 
 WORKER_DIED = "WorkerDied"
 """Kind of failure of a unit whose worker ended each time."""
@@ -78,7 +79,7 @@ def _code(call: Callable[..., Any]) -> str:
     if isinstance(call, partial):
         return f"{_code(call.func)}{call.args}{sorted(call.keywords.items())}"
     if call.__module__.partition(".")[0] == "rigwatch":
-        return ""  # its version stands for it
+        return ""  # rigwatch's own: the version identifies it
     try:
         return inspect.getsource(call)
     except (OSError, TypeError):
@@ -145,7 +146,9 @@ def _run_unit(job: Job, settings: Mapping[str, Any], path: str) -> Outcome:
         unit = job.unit(path)
         content = job.content(unit)
         value = job.call(unit, **settings)
-        return Outcome(path, content, as_json(value), seconds=time.perf_counter() - began)
+        return Outcome(
+            path, content, as_json(value, sort_keys=True), seconds=time.perf_counter() - began
+        )
     except RigwatchError as error:
         kind, text = type(error).__name__, str(error)
     except OSError as error:
@@ -154,20 +157,3 @@ def _run_unit(job: Job, settings: Mapping[str, Any], path: str) -> Outcome:
         kind, text = type(error).__name__, f"{path}: {error}"
     line = " ".join(text.split())
     return Outcome(path, content, b"", kind, line, time.perf_counter() - began)
-
-
-def as_json(value: Any) -> bytes:
-    """A result as JSON, the same bytes for the same result.
-
-    Raises:
-        NotImplementedError: it is no plain data.
-    """
-    return msgspec.json.encode(value, enc_hook=_plain, order="deterministic")
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Path):
-        return str(value)
-    if hasattr(value, "tolist"):
-        return value.tolist()
-    raise NotImplementedError(f"a result holds {type(value).__name__}, which has no JSON form")

@@ -92,7 +92,7 @@ class Journal:
         return opened
 
     def _read(self) -> None:
-        """Take notice of the lines that are there; cut off a torn one."""
+        """Index the lines that are there; cut off a torn one."""
         if self._file is None:
             return
         self._file.seek(0)

@@ -23,22 +23,15 @@ class Pool:
     """
 
     def __init__(self, executor: Executor | Maker | None) -> None:
+        self.executor: Executor
         self._make: Maker | None
-        if executor is None:
-            self._make = Here
-        elif isinstance(executor, Executor):
-            self._make = _maker_of(executor)
+        if isinstance(executor, Executor):
+            self.executor, self._make, self._own = executor, _maker_of(executor), False
         else:
-            self._make = executor
-        given = isinstance(executor, Executor)
-        self.executor: Executor = executor if isinstance(executor, Executor) else self._made()
-        self._own = not given
+            self._make = executor or Here
+            self.executor, self._own = self._make(), True
         self.generation = 0
         self._workers, self._counted = 0, 0.0
-
-    def _made(self) -> Executor:
-        assert self._make is not None
-        return self._make()
 
     def submit(self, call: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """Submit a call; a broken executor is replaced first.
@@ -61,7 +54,7 @@ class Pool:
                 failed += 1
 
     def check(self) -> None:
-        """Replace an executor that broke without a word.
+        """Replace an executor that broke unnoticed.
 
         Before Python 3.12 a call that is submitted while the pool breaks may be forgotten: its
         future is never done.
@@ -82,7 +75,7 @@ class Pool:
             raise BatchError(f"{kind} is broken; pass a function that makes a new one")
         if self._own:
             self.executor.shutdown(wait=False, cancel_futures=True)
-        self.executor, self._own = self._made(), True
+        self.executor, self._own = self._make(), True
         self.generation += 1
 
     @property

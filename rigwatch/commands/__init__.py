@@ -94,7 +94,7 @@ def _run(given: Sequence[str]) -> int:
         try:
             arguments = _parser(given).parse_args(given)
         except SystemExit:
-            sys.stdout.flush()  # the help, which at the end of the process nobody would miss
+            sys.stdout.flush()  # the help: a failed write would go unnoticed at exit
             raise
         code = int(arguments.run(arguments))
         sys.stdout.flush()

@@ -17,7 +17,7 @@ class _EndedError(BaseException):
 def unwound_at_signal() -> Iterator[None]:
     """Let SIGTERM and SIGHUP leave the block by an exception, then end the process as they do.
 
-    A signal that the process ignores or handles itself stays as it is.
+    A signal that the process ignores or handles itself is left alone.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -3,7 +3,6 @@
 The cursor is at the first alarm that indicates a fault, or at the end if there is none.
 """
 
-import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,9 +11,9 @@ from typing import TypeGuard
 import rerun as rr
 from rerun.experimental import ViewerClient
 
-from rigwatch.dashboard.board import APPLICATION, NAMED_FAULTS, Dashboard, Facts, Windows, is_active
+from rigwatch.dashboard.board import NAMED_FAULTS, Dashboard, Facts, Windows, is_active
 from rigwatch.dashboard.board import entities as at
-from rigwatch.dashboard.viewer import RECORDING_MEMORY, Viewer, ViewerError, save_picture
+from rigwatch.dashboard.viewer import RECORDING_MEMORY, Viewer, await_data, save_picture
 from rigwatch.wire.messages import Alarm, Message
 
 _FLUSH_AFTER = 16384
@@ -22,7 +21,6 @@ _LONGEST_WHOLE = 300.0
 _SIGNALS = 5.0
 _HISTORY = 60.0
 _FLUSH_TIMEOUT = 60.0
-_DRAWING_TIMEOUT = 60.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,11 +49,6 @@ class Drawn:
 def windows_for(seconds: float) -> Windows:
     """Time span of the plots for a recording of that length [s]."""
     return Windows(_SIGNALS, None if seconds <= _LONGEST_WHOLE else _HISTORY)
-
-
-def new_stream(name: str) -> rr.RecordingStream:
-    """A viewer recording, not connected yet."""
-    return rr.RecordingStream(APPLICATION, recording_id=name)
 
 
 def draw(
@@ -112,11 +105,7 @@ def point_cursor(url: str, t_ns: int) -> None:
         ViewerError: it does not receive them in time.
     """
     client = ViewerClient.connect(url)
-    deadline = time.monotonic() + _DRAWING_TIMEOUT
-    while _end_of(client) < t_ns:
-        if time.monotonic() > deadline:
-            raise ViewerError("the viewer did not take all data in time")
-        time.sleep(0.1)
+    await_data(client, at.TIMELINE, t_ns)
     client.set_time(at.TIMELINE, timestamp=t_ns / 1e9, play_state="paused")
 
 
@@ -132,13 +121,3 @@ def headless_viewer() -> Viewer:
         ViewerError: it does not start.
     """
     return Viewer("headless", memory=RECORDING_MEMORY).await_answer()
-
-
-def _end_of(client: ViewerClient) -> int:
-    ends = [
-        timeline.end or 0
-        for recording in client.get_state().recordings
-        for timeline in recording.timelines
-        if timeline.name == at.TIMELINE
-    ]
-    return max(ends, default=0)

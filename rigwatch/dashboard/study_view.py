@@ -8,7 +8,6 @@ Independent of workbench and structures: the data come as plain columns.
     test/statistic, test/threshold, test/<instant>          [share of the threshold]
 """
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,8 +17,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.experimental import ViewerClient
 
-from rigwatch.dashboard.board import APPLICATION, palette
-from rigwatch.dashboard.viewer import Viewer, ViewerError, save_picture
+from rigwatch.dashboard.board import palette, screen
+from rigwatch.dashboard.viewer import Viewer, await_data, save_picture
 from rigwatch.wire.arrays import FloatArray
 
 TIMELINE = "recording"
@@ -29,7 +28,6 @@ _SHOWN = 3
 _TALL = 3.0
 """Upper end of the test's axis, in thresholds."""
 _FLUSH_TIMEOUT = 60.0
-_ARRIVAL_TIMEOUT = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,11 +116,6 @@ def _draw_test(stream: rr.RecordingStream, seconds: FloatArray, judged: Judged) 
         _send(stream, f"{_TEST}/{_path(name)}", np.full(2, at), upright, look)
 
 
-def new_stream(name: str) -> rr.RecordingStream:
-    """A viewer recording, not connected yet."""
-    return rr.RecordingStream(APPLICATION, recording_id=name)
-
-
 def take_picture(viewer: Viewer, seconds: float, path: Path) -> None:
     """Write what a headless viewer shows once it has data up to `seconds` [s].
 
@@ -130,23 +123,8 @@ def take_picture(viewer: Viewer, seconds: float, path: Path) -> None:
         ViewerError: it does not receive them in time.
     """
     client = ViewerClient.connect(viewer.url)
-    deadline = time.monotonic() + _ARRIVAL_TIMEOUT
-    while _end_of(client) < seconds * 0.999:
-        if time.monotonic() > deadline:
-            raise ViewerError("the viewer did not take all data in time")
-        time.sleep(0.1)
+    await_data(client, TIMELINE, seconds * 0.999e9)
     save_picture(client, path)
-
-
-def _end_of(client: ViewerClient) -> float:
-    """Where the timeline ends [s]."""
-    ends = [
-        timeline.end or 0
-        for recording in client.get_state().recordings
-        for timeline in recording.timelines
-        if timeline.name == TIMELINE
-    ]
-    return max(ends, default=0) * 1e-9
 
 
 def _look(
@@ -191,15 +169,8 @@ def _blueprint(outputs: Sequence[Output], judged: Judged | None, *, bare: bool) 
     if others:
         plots = rrb.Tabs(plots, rrb.Vertical(*others, name="Other signals"))
     story = rrb.TextDocumentView(origin=_STORY, name="In words")
-    return rrb.Blueprint(
-        rrb.Horizontal(plots, story, column_shares=[7, 2]),
-        rrb.TopPanel(state="hidden" if bare else "expanded"),
-        rrb.TimePanel(state="hidden" if bare else "collapsed", timeline=TIMELINE),
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
-        auto_views=False,
-        auto_layout=False,
-    )
+    content = rrb.Horizontal(plots, story, column_shares=[7, 2])
+    return screen(content, TIMELINE, bare=bare)
 
 
 def _views(outputs: Sequence[Output]) -> list[rrb.TimeSeriesView]:

@@ -18,6 +18,7 @@ from rigwatch.demo.verdict import ALARM, Recording, complaints, read_recording
 from rigwatch.recorder import newest
 from rigwatch.wire.bus import connect, unique_process
 from rigwatch.wire.errors import DeviceError
+from rigwatch.wire.host import end_process
 from rigwatch.wire.messages import ALARMS, ESTIMATES, SAMPLES, Alarm, EstimateBlock, SampleBlock
 from rigwatch.wire.rig_config import load_rig
 from sim_plant.scenario import load_scenario
@@ -143,14 +144,10 @@ class Show:
     def _stop(self) -> None:
         assert self._up is not None
         self._say("stopping the rig; the recording is closed")
-        self._up.send_signal(signal.SIGTERM)
         # A second Ctrl-C must not leave a half written file behind.
         previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
         try:
-            self._up.wait(STOP_TIMEOUT)
-        except subprocess.TimeoutExpired:
-            self._up.kill()
-            self._up.wait()
+            end_process(self._up, STOP_TIMEOUT)
         finally:
             signal.signal(signal.SIGINT, previous)
 

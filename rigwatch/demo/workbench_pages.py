@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from rigwatch.demo.rig_file import relative
+from rigwatch.wire.host import end_process
 
 STOP_TIMEOUT = 10.0
 
@@ -39,11 +40,7 @@ def workbench_pages(folder: Path, rig: Path, say: Callable[[str], None]) -> Iter
     try:
         yield
     finally:
-        process.terminate()
-        try:
-            process.wait(STOP_TIMEOUT)
-        except subprocess.TimeoutExpired:
-            process.kill()
+        end_process(process, STOP_TIMEOUT)
         say(f"its studies:   rigwatch workbench {relative(studies)}")
 
 

@@ -6,8 +6,8 @@ of its own: a rig that does not answer delays none.
 
 from rigwatch.fleet.dashboards import Dashboards
 from rigwatch.fleet.fleet import Fleet
+from rigwatch.fleet.overview import as_lines, as_live_page, as_page, as_part, summary
 from rigwatch.fleet.rig_state import RigState
-from rigwatch.fleet.shown import as_lines, as_live_page, as_page, as_part, summary
 
 __all__ = [
     "Dashboards",

@@ -10,7 +10,7 @@ from typing import IO
 
 from rigwatch.fleet.rig_state import RigState
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.wire.host import free_port, is_free
+from rigwatch.wire.host import end_process, free_port, is_free, last_line
 
 MOST = 8
 """Dashboards that are open at once; the one that was asked for longest ago makes room."""
@@ -28,25 +28,14 @@ class _Dashboard:
     said: IO[bytes]
     port: int
 
-    def last_words(self) -> str:
-        """The last line that it said."""
-        self.said.seek(0)
-        lines = self.said.read().decode(errors="replace").strip().splitlines()
-        return lines[-1] if lines else ""
-
     def end(self) -> None:
         """End it."""
-        self.process.terminate()
-        try:
-            self.process.wait(timeout=5.0)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
+        end_process(self.process, 5.0)
         self.said.close()
 
 
 class Dashboards:
-    """The dashboards that were opened, by rig; each goes on until `close`."""
+    """The dashboards that were opened, by rig; each runs until `close`."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -66,7 +55,7 @@ class Dashboards:
         deadline = time.monotonic() + PATIENCE
         while is_free(HOST, one.port):
             if one.process.poll() is not None:
-                raise RigwatchError(one.last_words() or f"{state.rig}: the dashboard has ended")
+                raise RigwatchError(last_line(one.said) or f"{state.rig}: the dashboard has ended")
             if time.monotonic() > deadline:
                 raise RigwatchError(f"{state.rig}: no dashboard answers within {PATIENCE:g} s")
             time.sleep(_LOOK_AGAIN)

@@ -1,4 +1,4 @@
-"""Looks at many rigs at once."""
+"""Polls many rigs at once."""
 
 import contextlib
 import time
@@ -37,7 +37,7 @@ class Onlooker:
         self._heard_at: dict[str, float] = {}
         self._hung: set[str] = set()
 
-    def look(self) -> RigState:
+    def state(self) -> RigState:
         """The present state."""
         rig, path = self._config.rig.id, str(self._path)
         try:
@@ -113,9 +113,9 @@ class Fleet:
         self._rigs = [Onlooker(path, config, timeout) for path, config in load_rigs(paths)]
         self._threads = ThreadPoolExecutor(min(MOST_AT_ONCE, max(1, len(paths))))
 
-    def look(self) -> list[RigState]:
+    def states(self) -> list[RigState]:
         """The present state of each rig, the worst first; those alike by name."""
-        states = list(self._threads.map(Onlooker.look, self._rigs))
+        states = list(self._threads.map(Onlooker.state, self._rigs))
         return sorted(states, key=lambda state: (-state.rank, state.rig))
 
     def close(self) -> None:

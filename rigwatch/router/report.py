@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from rigwatch.router.refusal_log import RefusalLog
-from rigwatch.wire.access import days_left, ending_soon, in_force, read_register, told
+from rigwatch.wire.access import days_left, ending_soon, endings_text, in_force, read_register
 from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.errors import KeysError, RigwatchError
 from rigwatch.wire.messages import EVENTS, HEALTH, Event, Health
@@ -24,7 +24,7 @@ BETWEEN_HEALTH = 1.0
 BETWEEN_EVENTS = 60.0
 """Shortest time between two events about refusals [s]."""
 BETWEEN_LOOKS, DAY = 60.0, 86_400.0
-"""Time between two looks at the certificates' ends, and between two events about them [s]."""
+"""Time between two checks of the certificates' ends, and between two events about them [s]."""
 
 
 class RouterReport:
@@ -83,7 +83,7 @@ class RouterReport:
         if now - self._looked_at < BETWEEN_LOOKS:
             return
         self._looked_at = now
-        with contextlib.suppress(KeysError):  # whoever follows the register says so
+        with contextlib.suppress(KeysError):  # the follower of the register reports it
             register = read_register(Path(self._config.bus.security.keys))
             today = datetime.fromtimestamp(t_ns / 1e9, UTC).date()
             left = [days_left(one, today) for one in in_force(register)]
@@ -91,4 +91,4 @@ class RouterReport:
             soon = ending_soon(register, today)
             if soon and now - self._warned_at >= DAY:
                 self._warned_at = now
-                yield Event(PROCESS, t_ns, "error", "CERTIFICATES END", told(soon))
+                yield Event(PROCESS, t_ns, "error", "CERTIFICATES END", endings_text(soon))

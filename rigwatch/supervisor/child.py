@@ -100,7 +100,7 @@ class Child:
             self._process.terminate()
 
     def renew(self) -> None:
-        """Ask it to look at its configuration again."""
+        """Ask it to reload its configuration."""
         if self._process is not None:
             self._process.send_signal(signal.SIGHUP)
 

@@ -1,10 +1,10 @@
-"""Follows the configuration while the rig runs: what a change concerns is started anew.
+"""Follows the configuration while the rig runs: a change restarts the processes it concerns.
 
-    file changed ─▶ read ─┬─ wrong: told with its line, everything runs on as it was
-                          └─ right: told, and the processes of the changed sections are restarted
+    file changed ─▶ read ─┬─ wrong: reported with its line, nothing is restarted
+                          └─ valid: reported, and processes of the changed sections are restarted
 
 A recorder is restarted by every change, as a session carries the hash of its configuration. A daq
-or recorder of several rigs starts the changed rig anew by itself, so that the others go on.
+or recorder of several rigs restarts the changed rig by itself, so that the others continue.
 """
 
 import hashlib
@@ -18,7 +18,7 @@ from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.rig_config import RigConfig, load_rig, rig_text
 
 INTERVAL = 0.5
-"""Time between two looks at the file [s]."""
+"""Time between two checks of the file [s]."""
 _OF_ALL = ("rig", "bus", "channels")
 """Sections that every process uses."""
 
@@ -50,13 +50,13 @@ class ConfigWatch:
     ) -> None:
         self._path, self._config, self._supervisor = Path(path), config, supervisor
         self._tell, self._load, self._follow, self._clock = tell, read, follow, clock
-        self._hash, self._looked_at = hash_of(self._path), clock()
+        self._hash, self._checked_at = hash_of(self._path), clock()
 
-    def look(self) -> None:
-        """Look at the file if it is time to, and act on a change."""
-        if self._clock() - self._looked_at < INTERVAL:
+    def check(self) -> None:
+        """Check the file if it is due, and act on a change."""
+        if self._clock() - self._checked_at < INTERVAL:
             return
-        self._looked_at = self._clock()
+        self._checked_at = self._clock()
         found = hash_of(self._path)
         if found in (self._hash, ""):
             return
@@ -91,7 +91,7 @@ class ConfigWatch:
 
 
 def hash_of(path: Path) -> str:
-    """Hash of a configuration's content; "" while it cannot be read, as in the midst of a save."""
+    """Hash of a configuration's content; "" while it cannot be read, as during a save."""
     try:
         return hashlib.sha256(_content(path)).hexdigest()
     except OSError:

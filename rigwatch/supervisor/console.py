@@ -28,7 +28,7 @@ class Flow:
         self.totals: dict[str, int] = {}
         self.rates: dict[str, float] = {}
 
-    def look(self) -> None:
+    def update(self) -> None:
         """Update with the current counts."""
         for name, watched in self._supervisor.processes.items():
             before, now = self._counts.get(name, 0), watched.vitals.count

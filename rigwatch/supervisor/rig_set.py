@@ -46,16 +46,16 @@ class RigSet:
         self._watches = {path: self._watch(path, config) for path, config in rigs}
         self._wrong = {path: hash_of(path) for path in paths if path not in self._rigs}
         self._there = dict.fromkeys(paths, time.monotonic())
-        self._looked_at = time.monotonic()
+        self._checked_at = time.monotonic()
 
-    def look(self) -> None:
-        """Look at the files if it is time to, and act on changes."""
+    def check(self) -> None:
+        """Check the files if it is due, and act on changes."""
         for watch in self._watches.values():
-            watch.look()
+            watch.check()
         now = time.monotonic()
-        if now - self._looked_at < INTERVAL or len(self._paths) == 1:
+        if now - self._checked_at < INTERVAL or len(self._paths) == 1:
             return
-        self._looked_at = now
+        self._checked_at = now
         self._there |= {path: now for path in self._paths if path.is_file()}
         for path in self._paths:
             if path in self._wrong:

@@ -111,18 +111,24 @@ class SerialSection(Section, frozen=True, tag="serial", tag_field="adapter"):
     baud: Annotated[int, Meta(gt=0, description="baud rate")] = 115200
 
 
+UnitId = Annotated[int, Meta(ge=0, le=247, description="unit id")]
+Polls = Annotated[float, Meta(gt=0, description="polls a second")]
+WordOrder = Annotated[
+    Literal["big", "little"],
+    Meta(description="word order of 32-bit values: big puts the high word first"),
+]
+ReplyTime = Annotated[float, Meta(gt=0, description="time a reply may take [s]")]
+
+
 class ModbusSection(Section, frozen=True, tag="modbus-tcp", tag_field="adapter"):
     """[daq.device] adapter = "modbus-tcp" — blocks of buffered samples polled over TCP."""
 
     host: Annotated[Text, Meta(description="host name or address")]
     port: Annotated[int, Meta(ge=1, le=65535, description="TCP port")] = 502
-    unit: Annotated[int, Meta(ge=0, le=247, description="unit id")] = 1
-    polls: Annotated[float, Meta(gt=0, description="polls a second")] = 32.0
-    word_order: Annotated[
-        Literal["big", "little"],
-        Meta(description="word order of 32-bit values: big puts the high word first"),
-    ] = "big"
-    timeout: Annotated[float, Meta(gt=0, description="time a reply may take [s]")] = 0.3
+    unit: UnitId = 1
+    polls: Polls = 32.0
+    word_order: WordOrder = "big"
+    timeout: ReplyTime = 0.3
 
 
 class ModbusRtuSection(Section, frozen=True, tag="modbus-rtu", tag_field="adapter"):
@@ -130,13 +136,10 @@ class ModbusRtuSection(Section, frozen=True, tag="modbus-rtu", tag_field="adapte
 
     port: Annotated[Text, Meta(description="device file or glob pattern")]
     baud: Annotated[int, Meta(gt=0, description="baud rate")] = 115200
-    unit: Annotated[int, Meta(ge=0, le=247, description="unit id")] = 1
-    polls: Annotated[float, Meta(gt=0, description="polls a second")] = 32.0
-    word_order: Annotated[
-        Literal["big", "little"],
-        Meta(description="word order of 32-bit values: big puts the high word first"),
-    ] = "big"
-    timeout: Annotated[float, Meta(gt=0, description="time a reply may take [s]")] = 0.3
+    unit: UnitId = 1
+    polls: Polls = 32.0
+    word_order: WordOrder = "big"
+    timeout: ReplyTime = 0.3
 
 
 class ReplaySection(Section, frozen=True, tag="replay", tag_field="adapter"):

@@ -164,8 +164,8 @@ def _faults(member: Member) -> dict[str, Scenario]:
 
 def _hard(member: Member) -> dict[str, Scenario]:
     made = {}
-    for name, wished in HARD.items():
-        drive = held_back(member, wished, HARD_S, 0.035)
+    for name, hard in HARD.items():
+        drive = held_back(member, hard, HARD_S, 0.035)
         made[f"hard_{name}"] = Scenario(f"healthy; hard: {name}", drive, HARD_S)
         rubbing = f"hard_{name}_friction"
         made[rubbing] = _friction(member, rubbing, drive, HARD_S, HARD_ONSET_S)

@@ -21,6 +21,8 @@ from sim_plant.serve.source import Device, Pace
 logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
 
 TracePacket = Callable[[bool, bytes], bytes]
+UNIT, BAUD = 1, 115200
+"""Unit id; rate of the serial line, which a pty does not need."""
 _Server = ModbusTcpServer | ModbusSerialServer
 
 
@@ -31,7 +33,6 @@ class ModbusServer:
         device: the device.
         bank: its ring.
         rate: sample rate [Hz].
-        unit: unit id.
         trace: called with every packet (sending, bytes), and may change it, for line faults.
         heartbeat: called with the number of samples taken.
 
@@ -45,7 +46,6 @@ class ModbusServer:
         bank: RegisterBank,
         rate: float = 256.0,
         *,
-        unit: int = 1,
         trace: TracePacket | None = None,
         heartbeat: Heartbeat | None = None,
     ) -> None:
@@ -53,7 +53,6 @@ class ModbusServer:
         self.exception: int = 0
         self._bank = bank
         self._rate = rate
-        self._unit = unit
         self._trace = trace
         self._heartbeat = heartbeat or Heartbeat("plant", {})
 
@@ -65,10 +64,10 @@ class ModbusServer:
         """
         asyncio.run(self._serve(lambda: self._tcp(host, port), stop, f"{host}:{port}"))
 
-    def run_rtu(self, bridge: PtyBridge, stop: threading.Event, baud: int = 115200) -> None:
+    def run_rtu(self, bridge: PtyBridge, stop: threading.Event) -> None:
         """Serve on a serial line made of a pty until `stop` is set."""
         with bridge:
-            asyncio.run(self._serve(lambda: self._rtu(bridge.device_end, baud), stop, "pty"))
+            asyncio.run(self._serve(lambda: self._rtu(bridge.device_end), stop, "pty"))
 
     async def _serve(self, make: Callable[[], _Server], stop: threading.Event, where: str) -> None:
         pace = Pace(self._rate)
@@ -91,7 +90,7 @@ class ModbusServer:
 
     def _sim_device(self) -> SimDevice:
         registers = SimData(0, values=[0] * self._bank.size, datatype=DataType.REGISTERS)
-        return SimDevice(self._unit, [registers], action=self._fill)
+        return SimDevice(UNIT, [registers], action=self._fill)
 
     async def _fill(
         self,
@@ -111,11 +110,11 @@ class ModbusServer:
     def _tcp(self, host: str, port: int) -> ModbusTcpServer:
         return ModbusTcpServer(self._sim_device(), address=(host, port), trace_packet=self._trace)
 
-    def _rtu(self, port: str, baud: int) -> ModbusSerialServer:
+    def _rtu(self, port: str) -> ModbusSerialServer:
         return ModbusSerialServer(
             self._sim_device(),
             framer=FramerType.RTU,
             port=port,
-            baudrate=baud,
+            baudrate=BAUD,
             trace_packet=self._trace,
         )

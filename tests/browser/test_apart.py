@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rigwatch.browser.recordings.looking import look_at
+from rigwatch.browser.recordings.file_contents import contents_of
 from rigwatch.browser.work.apart import ApartError, apart
 from rigwatch.browser.work.study_process import warm_up
 
@@ -20,11 +20,11 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_result_and_a_refusal_come_back(table: Path) -> None:
-    assert apart(look_at, table).rows == 200_000
+    assert apart(contents_of, table).rows == 200_000
     with pytest.raises(ApartError, match=r"no\.csv: cannot be read: no such file"):
-        apart(look_at, table.with_name("no.csv"))
+        apart(contents_of, table.with_name("no.csv"))
 
 
 def test_a_file_that_needs_too_much_memory_is_refused(table: Path) -> None:
     with pytest.raises(ApartError, match="more than 16 MB of memory, expected a smaller file"):
-        apart(look_at, table, memory=16 << 20)
+        apart(contents_of, table, memory=16 << 20)

@@ -21,8 +21,8 @@ from rigwatch.wire.bus.connection import connect
 from rigwatch.wire.bus.subscription import Subscription
 from rigwatch.wire.bus.zenoh_transport import open_router
 from rigwatch.wire.host.ports import free_port
-from rigwatch.wire.messages.message_types import Alarm, EstimateBlock, Health, SampleBlock
-from rigwatch.wire.messages.topics import ALARMS, ESTIMATES, HEALTH, SAMPLES
+from rigwatch.wire.messages.message_types import Alarm, SampleBlock
+from rigwatch.wire.messages.topics import HEALTH, SAMPLES, topic_of
 from rigwatch.wire.rig_config import RigConfig, load_rig
 from tests.dashboard.rig_messages import RATE, Rig
 from tests.dashboard.screen import Screen
@@ -30,7 +30,6 @@ from tests.waiting import eventually
 
 pytestmark = pytest.mark.long
 
-TOPIC_OF = {SampleBlock: SAMPLES, EstimateBlock: ESTIMATES, Alarm: ALARMS, Health: HEALTH}
 CONFIG = """
 [rig]
 id = "bench"
@@ -92,7 +91,7 @@ class Player(threading.Thread):
                 self.sent += len(message)
             if isinstance(message, Alarm):
                 self.standing[message.name] = message
-            self.bus.publish(TOPIC_OF[type(message)], message)
+            self.bus.publish(topic_of(message), message)
 
     def alarms(self) -> list[Alarm]:
         return [alarm for alarm in self.standing.values() if alarm.state != "normal"]

@@ -70,8 +70,8 @@ def rigs(tmp_path: Path):
 def test_the_fleet_is_seen_and_a_rig_that_goes_moves_up(rigs, tmp_path, capsys):
     paths, monitor = rigs
     fleet = Fleet(paths, timeout=5.0)
-    eventually(lambda: fleet.look()[-1].figures["samples"] > 0, "the first samples")
-    away, stands, runs = fleet.look()
+    eventually(lambda: fleet.states()[-1].figures["samples"] > 0, "the first samples")
+    away, stands, runs = fleet.states()
     fleet.close()
     assert (away.rig, away.rank) == ("away", UNREACHABLE)
     assert "no router answers" in away.state
@@ -85,20 +85,20 @@ def test_the_fleet_is_seen_and_a_rig_that_goes_moves_up(rigs, tmp_path, capsys):
     assert [one["rig"] for one in json.loads(capsys.readouterr().out)] == ["stands", "runs"]
     assert "rig-runs" in page.read_text()
     one = Fleet(paths[:1], timeout=5.0)
-    assert one.look()[0].rank < GONE
+    assert one.states()[0].rank < GONE
     with stopped(monitor):
-        eventually(lambda: one.look()[0].hung == ("monitor",), "the rig's monitor hangs")
-        (state,) = Fleet(paths[:1], timeout=5.0).look()
+        eventually(lambda: one.states()[0].hung == ("monitor",), "the rig's monitor hangs")
+        (state,) = Fleet(paths[:1], timeout=5.0).states()
         assert (state.hung, state.missing) == (("monitor",), ())
         assert state.state == "monitor hangs: no sign of life"
         bus = base_bus(paths[0])
         eventually(lambda: "alive/monitor" not in bus.tokens("alive/*"), "the router's patience")
-        assert one.look()[0].hung == ("monitor",)
+        assert one.states()[0].hung == ("monitor",)
         bus.close()
-    eventually(lambda: not one.look()[0].hung, "the monitor goes on")
+    eventually(lambda: not one.states()[0].hung, "the monitor goes on")
     kill(monitor)
-    eventually(lambda: one.look()[0].missing == ("monitor",), "the rig lacks its monitor")
-    assert one.look()[0].hung == ()
+    eventually(lambda: one.states()[0].missing == ("monitor",), "the rig lacks its monitor")
+    assert one.states()[0].hung == ()
     one.close()
 
 

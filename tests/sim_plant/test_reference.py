@@ -44,7 +44,7 @@ def slopes(t: float, y: NDArray[np.float64], volts: float, null: float) -> list[
     push = p1 * a1 - p2 * a2 - P.atmosphere * (a1 - a2) - P.piston_viscous * v
     return [
         v,
-        push / P.moving_mass,
+        push / (P.piston_mass + P.load_mass),
         GAMMA * (into_1 - p1 * a1 * v) / (P.dead_volume + a1 * (P.stroke / 2 + x)),
         GAMMA * (into_2 + p2 * a2 * v) / (P.dead_volume + a2 * (P.stroke / 2 - x)),
         du,

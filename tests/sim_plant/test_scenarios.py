@@ -8,9 +8,9 @@ import pytest
 from msgspec import structs
 
 from rigwatch.wire.errors import ConfigError
-from rigwatch.wire.typed_files.loading import Section
+from rigwatch.wire.typed_files import Section, load
 from sim_plant.excitation import SHAPES
-from sim_plant.parameters import RigParameters, load_parameters
+from sim_plant.parameters import RigParameters
 from sim_plant.scenario import Event, Experiment, Scenario, ScenarioRun, load_scenario
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -179,7 +179,7 @@ def test_every_key_is_described(kind: type[Section]):
 
 
 def test_plant_file_names_every_key_with_its_default():
-    loaded = load_parameters(CONFIGS / "plants" / "servo_pneumatic.toml")
+    loaded = load(CONFIGS / "plants" / "servo_pneumatic.toml", RigParameters)
     for name, value in structs.asdict(RigParameters()).items():
         assert getattr(loaded, name) == pytest.approx(value), name
     text = (CONFIGS / "plants" / "servo_pneumatic.toml").read_text()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tools import alarm_docs, benchmark_page, format_docs, pictures
+from tools import docs, pictures
 
 ROOT = Path(__file__).parents[2]
 CODE = ("benchmarks", "daq", "monitor", "rigwatch", "sim_plant", "tests")
@@ -26,16 +26,9 @@ def text_of(page: Path) -> str:
     return page.read_text(encoding="utf-8")
 
 
-def test_the_table_of_alarms_is_that_of_the_code() -> None:
-    assert text_of(alarm_docs.TARGET) == alarm_docs.page(), "run `make docs`"
-
-
-def test_the_page_of_file_formats_says_what_the_code_says() -> None:
-    assert text_of(format_docs.TARGET) == format_docs.page(), "run `make docs`"
-
-
-def test_the_page_of_the_benchmarks_shows_the_figures_that_are_kept() -> None:
-    assert text_of(benchmark_page.PAGE) == benchmark_page.page(), "run `make docs`"
+@pytest.mark.parametrize("name", docs.PAGES)
+def test_written_pages_say_what_their_source_says(name: str) -> None:
+    assert text_of(ROOT / "docs" / name) == docs.PAGES[name](), "run `make docs`"
 
 
 @pytest.mark.parametrize("source", sorted(PICTURES.glob("*.txt")), ids=lambda path: path.stem)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rigwatch.browser.recordings.recorded import write_channels
+from rigwatch.browser.recordings.channels import write_channels
 from rigwatch.browser.signals import Trace, open_trace
 from rigwatch.browser.work import Results
 from rigwatch.page import Plot, limits

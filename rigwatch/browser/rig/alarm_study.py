@@ -22,7 +22,7 @@ LEAST = 4.0
 AROUND = 0.5
 """Time skipped on both sides of the onset, and between training and held-out data [s]."""
 FRESH = 3.0
-"""Age of the last sample up to which the recording is taken to go on [s]."""
+"""Age of the last sample up to which the recording counts as running [s]."""
 TEMPLATE = "rig"
 """Used where the monitor's model has no equations."""
 
@@ -45,7 +45,7 @@ def study_of_alarm(root: Path, config: RigConfig, alarm: Alarm, now: float | Non
         now: Unix time, that of this machine if None [s].
 
     Raises:
-        TooSoonError: the fault lasts, and its recording goes on.
+        TooSoonError: the fault lasts, and is still being recorded.
         SessionError: too little was recorded before or after the onset.
     """
     if config.recorder is None:

@@ -17,7 +17,7 @@ TIMEOUT = 2.0
 ASK_EVERY = 2.0
 """Time between questions for the standing alarms [s]."""
 TURN = 0.1
-"""Time between looks at the bus [s]."""
+"""Time between two reads of the bus [s]."""
 
 
 class RigLink:

@@ -12,6 +12,7 @@ from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import Alarm
 from rigwatch.wire.session import SUFFIX, Session, open_session
 
+CLEARED = "cleared_unacknowledged"
 CLEARS = 1.5
 """Time after the end of a fault at which its alarm clears [s]."""
 
@@ -39,13 +40,9 @@ class Onset:
         """Length of the fault [s]; None if its alarm has not cleared in these segments."""
         for item in self.session.messages(["alarms"], start=self.t_ns):
             found = item.message
-            if isinstance(found, Alarm) and found.name == name and _cleared(found):
+            if isinstance(found, Alarm) and found.name == name and found.state == CLEARED:
                 return (found.t_ns - self.t_ns) / 1e9 - CLEARS
         return None
-
-
-def _cleared(alarm: Alarm) -> bool:
-    return alarm.state == "cleared_unacknowledged"
 
 
 def onset_of(folder: Path, rig: str, alarm: Alarm) -> Onset:

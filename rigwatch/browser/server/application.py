@@ -70,7 +70,7 @@ async def style(_: Request) -> Response:
 async def _lifespan(app: Starlette) -> AsyncIterator[None]:
     context: Context = app.state.context
     warm_up()
-    with contextlib.suppress(RigwatchError):  # the rig's page tells what is wrong
+    with contextlib.suppress(RigwatchError):  # the rig's page shows what is wrong
         rig_routes.link_of(app)
     watching = asyncio.create_task(context.desks.watch(stamp))
     try:

@@ -7,17 +7,18 @@ from functools import wraps
 from pathlib import Path
 from typing import Any
 
-import msgspec
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
 
 from rigwatch.browser.server.places import PlaceError, Places
-from rigwatch.browser.work import Desk, Desks, as_plain
+from rigwatch.browser.work import Desk, Desks
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.wire.typed_files import JsonError, json_value
+from rigwatch.wire.typed_files import JsonError, as_json, json_value
 
 MOST_BODY = 1 << 20
 """Largest request that is not an upload [bytes]."""
+NOT_KEPT = {"cache-control": "no-store"}
+"""Headers of what browsers shall ask for again."""
 LARGEST_NUMBER = 2.0**53
 """Largest number in an address; the integers up to it are exact, and NaN is not below it."""
 
@@ -57,15 +58,13 @@ def context_of(request: Request) -> Context:
 
 def answer(value: Any, status: int = 200) -> Response:
     """A value as a JSON response; non-finite numbers become null."""
-    body = msgspec.json.encode(as_plain(value))
-    headers = {"cache-control": "no-store"}
-    return Response(body, status, headers, media_type="application/json")
+    return Response(as_json(value), status, NOT_KEPT, media_type="application/json")
 
 
 Handler = Callable[[Request], Awaitable[Response]]
 
 
-def told(handler: Handler) -> Handler:
+def errors_answered(handler: Handler) -> Handler:
     """A handler whose user errors become a one-line response."""
 
     @wraps(handler)

@@ -8,7 +8,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 from starlette.routing import Route
 
-from rigwatch.browser.server.context import answer, body_of, context_of, told
+from rigwatch.browser.server.context import NOT_KEPT, answer, body_of, context_of, errors_answered
 from rigwatch.browser.server.places import MODELS, PlaceError
 from rigwatch.browser.views import begun_model, checked, first_text, render
 from rigwatch.physics.engine.equations import shipped_models
@@ -67,7 +67,7 @@ def _page(
         "edit.html", place="edit", has_rig=context_of(request).rig is not None, kind=kind,
         name=name, text=text, trouble=trouble, models=list(shipped_models()), **values,
     )  # fmt: skip
-    return HTMLResponse(html, 404 if trouble else 200, headers={"cache-control": "no-store"})
+    return HTMLResponse(html, 404 if trouble else 200, headers=NOT_KEPT)
 
 
 async def check(request: Request) -> Response:
@@ -107,11 +107,11 @@ def _save(request: Request, kind: str, file: str, text: str, seen: object) -> Re
         )
     if kind == "effect":
         names = learn_text(study, file, text)[1]
-        told = f"saved; Explain ranks {', '.join(names)} with the others"
+        done = f"saved; Explain ranks {', '.join(names)} with the others"
     else:
         remodel(study, file, text)
-        told = "saved; the study now uses this model"
-    return answer({"text": told, "seen": digest(text)})
+        done = "saved; the study now uses this model"
+    return answer({"text": done, "seen": digest(text)})
 
 
 def _save_model(request: Request, file: str, text: str) -> Response:
@@ -130,6 +130,6 @@ def _save_model(request: Request, file: str, text: str) -> Response:
 ROUTES = [
     Route("/edit-model", new_model_page),
     Route("/edit/{kind}/{name:path}", edit_page),
-    Route("/api/check/{kind}/{name:path}", told(check), methods=["POST"]),
-    Route("/api/save/{kind}/{name:path}", told(save), methods=["POST"]),
+    Route("/api/check/{kind}/{name:path}", errors_answered(check), methods=["POST"]),
+    Route("/api/save/{kind}/{name:path}", errors_answered(save), methods=["POST"]),
 ]

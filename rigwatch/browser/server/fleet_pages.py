@@ -1,4 +1,4 @@
-"""The live page of many rigs: one look for all pages that are open, and events for each."""
+"""The live page of many rigs: one poll for all open pages, and events for each."""
 
 import asyncio
 import contextlib
@@ -16,24 +16,25 @@ from starlette.staticfiles import StaticFiles
 
 from rigwatch.browser.server.access import Access, Guard
 from rigwatch.browser.server.application import STATIC, style
+from rigwatch.browser.server.context import NOT_KEPT
 from rigwatch.browser.server.event_streams import STILL_HERE, event, event_stream
 from rigwatch.fleet import Dashboards, RigState, as_live_page, as_part, summary
 from rigwatch.wire.errors import RigwatchError
 
 BETWEEN = 2.0
-"""Time between two looks at the rigs [s]."""
+"""Time between two polls of the rigs [s]."""
 STILL_EVERY = 5.0
-"""Time after which a page without news is told that the server is there [s]."""
+"""Time after which a page without news gets a sign of life [s]."""
 OLD_AFTER = 10.0
-"""Time without a look that ends, after which the pages are told that their figures are old [s]."""
-Look = Callable[[], list[RigState]]
+"""Time without a completed poll after which the pages say that their figures are old [s]."""
+States = Callable[[], list[RigState]]
 
 
 class FleetPages:
     """State of the server.
 
     Args:
-        look: returns the present state of the rigs, the worst first; may take seconds.
+        poll: returns the present state of the rigs, the worst first; may take seconds.
 
     Attributes:
         states: as last seen.
@@ -41,36 +42,36 @@ class FleetPages:
         stopping: set when the server is about to stop.
     """
 
-    def __init__(self, look: Look) -> None:
+    def __init__(self, poll: States) -> None:
         self.states: list[RigState] = []
         self.stopping = asyncio.Event()
-        self._look = look
+        self._poll = poll
         self.dashboards = Dashboards()
         self._news = asyncio.Condition()
         self._seen_at = time.monotonic()
 
     async def follow(self) -> None:
-        """Look again and again, and tell the open pages."""
+        """Poll the rigs, and notify the open pages."""
         while True:
-            states = await asyncio.to_thread(self._look)
+            states = await asyncio.to_thread(self._poll)
             async with self._news:
                 self.states, self._seen_at = states, time.monotonic()
                 self._news.notify_all()
             await asyncio.sleep(BETWEEN)
 
     async def events(self) -> AsyncGenerator[bytes, None]:
-        """The rigs now, and whenever something has changed; how old they are if looks stall."""
-        told = b""
+        """The rigs now, and whenever something has changed; how old they are if polls stall."""
+        sent = b""
         while True:
             if (silent := time.monotonic() - self._seen_at) > OLD_AFTER:
-                told = b""  # the next look is told whatever it shows
+                sent = b""  # the next poll is sent whatever it shows
                 yield event("old", msgspec.json.encode({"seconds": round(silent)}))
             else:
                 content = msgspec.json.encode(
                     {"summary": summary(self.states), "html": as_part(self.states)}
                 )
-                yield STILL_HERE if content == told else event("rigs", content)
-                told = content
+                yield STILL_HERE if content == sent else event("rigs", content)
+                sent = content
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(STILL_EVERY), self._news:
                     await self._news.wait()
@@ -87,7 +88,7 @@ def fleet_application(pages: FleetPages, access: Access) -> Starlette:
         pages.dashboards.close()
 
     async def fleet_page(_: Request) -> Response:
-        return HTMLResponse(as_live_page(pages.states), headers={"cache-control": "no-store"})
+        return HTMLResponse(as_live_page(pages.states), headers=NOT_KEPT)
 
     async def events(request: Request) -> Response:
         return event_stream(request, pages.events())

@@ -14,8 +14,8 @@ from rigwatch.browser.recordings import (
     begin_story,
     channels_of,
     check_session,
+    contents_of,
     import_preview,
-    look_at,
     make_study,
     new_upload,
     recordings_in,
@@ -27,9 +27,9 @@ from rigwatch.browser.server.context import (
     answer,
     body_of,
     context_of,
+    errors_answered,
     number_of,
     refused,
-    told,
 )
 from rigwatch.browser.server.places import MODELS, RECORDINGS, UPLOADS, PlaceError
 from rigwatch.browser.server.signal_routes import packed, span_of
@@ -68,18 +68,18 @@ async def bring(request: Request) -> Response:
     if not await _written(request, path, most):
         return refused(f"found more than {most >> 20} MB, expected less", 413)
     try:
-        return answer({"upload": f"{folder.name}/{name}", "look": await _looked(path)})
+        return answer({"upload": f"{folder.name}/{name}", "look": await _contents(path)})
     except RigwatchError as error:
         _gone(path)
         raise ImportDataError(str(error).replace(f"{path}", name)) from None
 
 
-async def _looked(path: Path) -> Any:
+async def _contents(path: Path) -> Any:
     """Content of an uploaded file; None for a session, which needs no mapping."""
     if path.suffix == SUFFIX:
         await run_in_threadpool(apart, check_session, path)
         return None
-    return await run_in_threadpool(apart, look_at, path)
+    return await run_in_threadpool(apart, contents_of, path)
 
 
 async def _written(request: Request, path: Path, most: int) -> bool:
@@ -239,13 +239,13 @@ async def story(request: Request) -> Response:
 
 ROUTES = [
     Route("/new", new_page),
-    Route("/api/upload/{file}", told(bring), methods=["PUT"]),
-    Route("/api/import", told(take_in), methods=["POST"]),
-    Route("/api/import-preview", told(preview), methods=["POST"]),
-    Route("/api/recordings", told(recordings)),
-    Route("/api/recording/{file:path}", told(recording)),
-    Route("/api/recording-signals/{file:path}", told(recording_signals)),
-    Route("/api/template/{template}", told(template)),
-    Route("/api/new", told(make), methods=["POST"]),
-    Route("/api/story/{story}", told(story), methods=["POST"]),
+    Route("/api/upload/{file}", errors_answered(bring), methods=["PUT"]),
+    Route("/api/import", errors_answered(take_in), methods=["POST"]),
+    Route("/api/import-preview", errors_answered(preview), methods=["POST"]),
+    Route("/api/recordings", errors_answered(recordings)),
+    Route("/api/recording/{file:path}", errors_answered(recording)),
+    Route("/api/recording-signals/{file:path}", errors_answered(recording_signals)),
+    Route("/api/template/{template}", errors_answered(template)),
+    Route("/api/new", errors_answered(make), methods=["POST"]),
+    Route("/api/story/{story}", errors_answered(story), methods=["POST"]),
 ]

@@ -9,7 +9,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from rigwatch.browser.server.context import answer, body_of, context_of, told
+from rigwatch.browser.server.context import answer, body_of, context_of, errors_answered
 from rigwatch.browser.server.event_streams import event, event_stream
 from rigwatch.browser.server.study_routes import job_data
 from rigwatch.browser.work import Desk
@@ -96,7 +96,7 @@ async def _events(desk: Desk) -> AsyncGenerator[bytes, None]:
 
 
 ROUTES = [
-    Route("/api/begin/{name:path}", told(begin), methods=["POST"]),
-    Route("/api/cancel/{name:path}", told(cancel), methods=["POST"]),
-    Route("/api/events/{name:path}", told(events)),
+    Route("/api/begin/{name:path}", errors_answered(begin), methods=["POST"]),
+    Route("/api/cancel/{name:path}", errors_answered(cancel), methods=["POST"]),
+    Route("/api/events/{name:path}", errors_answered(events)),
 ]

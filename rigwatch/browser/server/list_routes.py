@@ -1,4 +1,4 @@
-"""Routes of the list of studies: page, table, and events as tasks go on and studies change."""
+"""Routes of the list of studies: page, table, and events as tasks proceed and studies change."""
 
 import asyncio
 from collections.abc import AsyncGenerator, AsyncIterator
@@ -12,7 +12,7 @@ from starlette.responses import HTMLResponse, Response
 from starlette.routing import Route
 
 from rigwatch.browser.recordings import stories
-from rigwatch.browser.server.context import Context, context_of
+from rigwatch.browser.server.context import NOT_KEPT, Context, context_of
 from rigwatch.browser.server.event_streams import event, event_stream
 from rigwatch.browser.server.study_routes import job_data
 from rigwatch.browser.views import listed, render, stamp, study_folders
@@ -20,7 +20,7 @@ from rigwatch.browser.work import Job
 
 Change = TypeVar("Change")
 EVERY = 0.5
-"""Time between looks at the files [s]; a change of a task is told at once."""
+"""Time between checks of the files [s]; changes of tasks are sent at once."""
 
 
 async def studies_page(request: Request) -> Response:
@@ -36,11 +36,9 @@ async def studies_page(request: Request) -> Response:
 
 
 async def studies_table(request: Request) -> Response:
-    """The table of the list, as it is now."""
+    """The current table of the list."""
     values = await run_in_threadpool(_table, context_of(request))
-    return HTMLResponse(
-        render("studies_table.html", **values), headers={"cache-control": "no-store"}
-    )
+    return HTMLResponse(render("studies_table.html", **values), headers=NOT_KEPT)
 
 
 def _table(context: Context) -> dict[str, Any]:
@@ -48,7 +46,7 @@ def _table(context: Context) -> dict[str, Any]:
 
 
 async def studies_events(request: Request) -> Response:
-    """Server-sent events: "jobs" as tasks go on, "studies" if the table changes."""
+    """Server-sent events: "jobs" as tasks proceed, "studies" if the table changes."""
     return event_stream(request, _events(context_of(request)))
 
 
@@ -94,7 +92,7 @@ def _jobs(context: Context, active: dict[Path, Job]) -> bytes:
 
 
 def _shown(context: Context) -> object:
-    """What tells that the table would be another one: files of studies, tasks that ended."""
+    """A value that changes with the table: files of studies, and tasks that ended."""
     ended = {folder: job.number for folder, job in context.desks.jobs().items() if not job.active}
     return {folder: stamp(folder) for folder in study_folders(context.places.root)}, ended
 

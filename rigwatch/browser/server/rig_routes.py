@@ -21,14 +21,14 @@ from rigwatch.browser.rig import (
     roll_back,
     study_of_alarm,
 )
-from rigwatch.browser.server.context import answer, body_of, context_of, told
+from rigwatch.browser.server.context import answer, body_of, context_of, errors_answered
 from rigwatch.browser.server.event_streams import STILL_HERE, event, event_stream
 from rigwatch.browser.server.places import PlaceError
 from rigwatch.browser.views import listed, render
-from rigwatch.browser.work import as_plain
 from rigwatch.wire.access import operator_name
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.messages import AlarmCommand
+from rigwatch.wire.typed_files import as_json
 
 ACTIONS = ("acknowledge", "reset")
 EVERY = 0.25
@@ -79,11 +79,11 @@ async def rig_events(request: Request) -> Response:
 
 
 async def _events(link: RigLink) -> AsyncGenerator[bytes, None]:
-    since, told = 0, b""
+    since, sent = 0, b""
     while True:
-        status = msgspec.json.encode(as_plain(link.status()))
-        if status != told:
-            told = status
+        status = as_json(link.status())
+        if status != sent:
+            sent = status
             yield event("status", status)
         newest, signals = link.signals(since)
         if newest != since:
@@ -151,10 +151,10 @@ async def rig_study(request: Request) -> Response:
 
 ROUTES = [
     Route("/rig", rig_page),
-    Route("/api/rig", told(rig_now)),
-    Route("/api/rig/events", told(rig_events)),
-    Route("/api/rig/history", told(rig_history)),
-    Route("/api/rig/rollback", told(rig_rollback), methods=["POST"]),
-    Route("/api/rig/alarm", told(rig_alarm), methods=["POST"]),
-    Route("/api/rig/study", told(rig_study), methods=["POST"]),
+    Route("/api/rig", errors_answered(rig_now)),
+    Route("/api/rig/events", errors_answered(rig_events)),
+    Route("/api/rig/history", errors_answered(rig_history)),
+    Route("/api/rig/rollback", errors_answered(rig_rollback), methods=["POST"]),
+    Route("/api/rig/alarm", errors_answered(rig_alarm), methods=["POST"]),
+    Route("/api/rig/study", errors_answered(rig_study), methods=["POST"]),
 ]

@@ -13,7 +13,7 @@ from starlette.applications import Starlette
 from rigwatch.browser.server.access import Access, hosts_of
 from rigwatch.browser.server.application import application
 from rigwatch.browser.server.context import Context
-from rigwatch.browser.server.fleet_pages import FleetPages, Look, fleet_application
+from rigwatch.browser.server.fleet_pages import FleetPages, States, fleet_application
 from rigwatch.browser.server.places import Places
 from rigwatch.wire.errors import RigwatchError, reason_of
 
@@ -80,18 +80,18 @@ def serve(options: Options, ready: Callable[[str], None]) -> None:
     _serve(options, lambda access: application(context, access), context.stopping, ready)
 
 
-def serve_fleet(look: Look, options: Listening, ready: Callable[[str], None]) -> None:
+def serve_fleet(poll: States, options: Listening, ready: Callable[[str], None]) -> None:
     """Serve the page of many rigs until interrupted; the rest as in `serve`.
 
     Args:
-        look: returns the present state of the rigs, the worst first.
+        poll: returns the present state of the rigs, the worst first.
         options: where.
         ready: called with the address to open.
 
     Raises:
         RigwatchError: an address other than loopback without TLS, or the port is in use.
     """
-    pages = FleetPages(look)
+    pages = FleetPages(poll)
     _serve(options, lambda access: fleet_application(pages, access), pages.stopping, ready)
 
 

@@ -11,7 +11,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from rigwatch.browser.server.context import answer, context_of, number_of, told
+from rigwatch.browser.server.context import NOT_KEPT, answer, context_of, errors_answered, number_of
 from rigwatch.browser.server.places import PlaceError
 from rigwatch.browser.signals import Trace, open_trace
 from rigwatch.browser.views import figure_csv, figure_svg
@@ -136,7 +136,7 @@ def packed(lines: dict[str, Trace], span: tuple[float, float], columns: int) -> 
     values = b"".join(np.ascontiguousarray(y, "<f4").tobytes() for _, y in cut.values())
     body = len(head).to_bytes(4, "little") + head + at + values
     # Not compressed: noise hardly shrinks, and compressing takes five times as long as all else.
-    headers = {"cache-control": "no-store", "content-encoding": "identity"}
+    headers = NOT_KEPT | {"content-encoding": "identity"}
     return Response(body, media_type="application/octet-stream", headers=headers)
 
 
@@ -186,7 +186,7 @@ def _figure(request: Request) -> Response:
 
 
 ROUTES = [
-    Route("/api/signals/{name:path}", told(signals)),
-    Route("/api/place/{name:path}", told(place)),
-    Route("/api/figure.{kind}/{name:path}", told(figure)),
+    Route("/api/signals/{name:path}", errors_answered(signals)),
+    Route("/api/place/{name:path}", errors_answered(place)),
+    Route("/api/figure.{kind}/{name:path}", errors_answered(figure)),
 ]

@@ -11,11 +11,19 @@ from starlette.responses import FileResponse, HTMLResponse, Response
 from starlette.routing import Route
 
 from rigwatch.browser.rig import can_roll_back, study_in_force
-from rigwatch.browser.server.context import Context, answer, context_of, number_of, told
+from rigwatch.browser.server.context import (
+    NOT_KEPT,
+    Context,
+    answer,
+    context_of,
+    errors_answered,
+    number_of,
+)
 from rigwatch.browser.server.places import PlaceError
 from rigwatch.browser.views import AtRig, candidate_html, parts_of, render, state_of
-from rigwatch.browser.work import Job, as_plain, model_in_force
+from rigwatch.browser.work import Job, model_in_force
 from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.typed_files import as_json
 
 
 def _step(request: Request) -> int | None:
@@ -37,7 +45,7 @@ async def study_page(request: Request) -> Response:
         return HTMLResponse(render("study.html", **(values | {"trouble": str(error)})), 404)
     shown = {name: Markup(html) for name, html in parts.items()}
     values |= {"model": state["model"], "parts": shown, "state": _script(state)}
-    return HTMLResponse(render("study.html", **values), headers={"cache-control": "no-store"})
+    return HTMLResponse(render("study.html", **values), headers=NOT_KEPT)
 
 
 async def study_parts(request: Request) -> Response:
@@ -88,22 +96,22 @@ def _at_rig(context: Context) -> AtRig | None:
 
 
 def _script(state: dict[str, Any]) -> Any:
-    return Markup(msgspec.json.encode(as_plain(state)).decode().replace("<", "\\u003c"))
+    return Markup(as_json(state).decode().replace("<", "\\u003c"))
 
 
 def job_data(job: Job | None) -> dict[str, Any] | None:
     """A job as JSON for the pages."""
     if job is None:
         return None
-    plain: dict[str, Any] = as_plain(job)
+    plain: dict[str, Any] = msgspec.to_builtins(job)
     return plain | {"active": job.active}
 
 
 FILES = {"report": "report.html", "experiment": "experiment.csv"}
 ROUTES = [
-    Route("/api/file/report/{name:path}", told(study_file)),
-    Route("/api/file/experiment/{name:path}", told(study_file)),
+    Route("/api/file/report/{name:path}", errors_answered(study_file)),
+    Route("/api/file/experiment/{name:path}", errors_answered(study_file)),
     Route("/study/{name:path}", study_page),
-    Route("/api/parts/{name:path}", told(study_parts)),
-    Route("/api/candidate/{name:path}", told(study_candidate)),
+    Route("/api/parts/{name:path}", errors_answered(study_parts)),
+    Route("/api/candidate/{name:path}", errors_answered(study_candidate)),
 ]

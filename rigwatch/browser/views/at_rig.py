@@ -37,7 +37,7 @@ def falls(rehearsal: dict[str, Any] | None) -> bool:
 
 
 def in_force(state: State, at: AtRig | None) -> bool:
-    """Whether the rig's model is the study's as it is now."""
+    """Whether the rig's model is that of the current study."""
     steps = [line.get("step") for line in state.ledger]
     changes = [step for step in steps if step in ("add", "undo", "base", "model-file", "promote")]
     return at is not None and at.study == state.name and changes[-1:] == ["promote"]

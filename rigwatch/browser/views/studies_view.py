@@ -55,7 +55,7 @@ def listed(root: Path) -> list[Listed]:
 
 
 def stamp(folder: Path) -> object:
-    """What tells that a study was changed."""
+    """A value that changes with the study's files."""
     return tuple(_state(folder / name) for name in (FILE, LEDGER))
 
 

@@ -5,7 +5,7 @@ from rigwatch.browser.work.desk import Desk, Desks, Job
 from rigwatch.browser.work.directions import Directions
 from rigwatch.browser.work.rehearsal import model_in_force
 from rigwatch.browser.work.results import FOLDER as RESULTS
-from rigwatch.browser.work.results import Results, as_plain, results_of, signal_key
+from rigwatch.browser.work.results import Results, results_of, signal_key
 from rigwatch.browser.work.study_process import warm_up
 
 __all__ = [
@@ -17,7 +17,6 @@ __all__ = [
     "Job",
     "Results",
     "apart",
-    "as_plain",
     "model_in_force",
     "results_of",
     "signal_key",

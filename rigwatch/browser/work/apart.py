@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from rigwatch.browser.work.study_process import WORKERS
-from rigwatch.browser.work.worker import end_with_parent
 from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.host import end_with_parent
 
 MOST_MEMORY = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
 """Most memory of such a process: half of the machine's [bytes]."""
@@ -57,7 +57,7 @@ def apart(function: Callable[..., Any], *arguments: Any, memory: int = MOST_MEMO
 def _run(
     pipe: Connection, memory: int, function: Callable[..., Any], arguments: tuple[Any, ...]
 ) -> None:
-    threading.Thread(target=end_with_parent, daemon=True).start()
+    end_with_parent()
     _bound(memory)
     try:
         found = "done", function(*arguments)

@@ -16,7 +16,7 @@ MOST_PROCESSES = 4
 MOST_WAITING = 64
 """Number of events queued for a page."""
 QUIET = frozenset({"show"})
-"""Tasks that start automatically and give way to requested ones."""
+"""Tasks that start automatically and do not block requested ones."""
 
 
 class BusyError(RigwatchError):
@@ -58,7 +58,7 @@ Told = tuple[str, Job | None]
 
 @dataclass(eq=False)
 class Listeners(Generic[Change]):
-    """Pages that hear of changes, each with a queue; false if there are none."""
+    """Pages that are notified of changes, each by a queue; false if there are none."""
 
     _queues: set[asyncio.Queue[Change]] = field(default_factory=set)
 
@@ -88,9 +88,9 @@ class Desk:
 
     Attributes:
         folder: the study's.
-        everyone: hears of the jobs of all studies.
+        everyone: notified of the jobs of all studies.
         job: the running job, or the last one; None before the first.
-        listeners: hear "job" with the job, or "study" if the study's files or results changed.
+        listeners: get "job" with the job, or "study" if the study's files or results changed.
     """
 
     folder: Path
@@ -107,9 +107,9 @@ class Desk:
         Raises:
             BusyError: another requested task is running.
         """
-        same = next((job for job in self._all() if self._is(job, task, arguments)), None)
-        if same is not None:
-            return same
+        for job in self._all():
+            if (job.task, job.arguments) == (task, arguments):
+                return job
         if task not in QUIET and any(job.task not in QUIET for job in self._all()):
             assert self.job is not None
             raise BusyError(f"{self.folder.name}: busy with {self.job.task}; cancel it or wait")
@@ -122,10 +122,6 @@ class Desk:
     def _all(self) -> list[Job]:
         running = [self.job] if self.job is not None and self.job.active else []
         return running + self._queue
-
-    @staticmethod
-    def _is(job: Job, task: str, arguments: Mapping[str, Any]) -> bool:
-        return (job.task, job.arguments) == (task, arguments)
 
     def cancel(self) -> bool:
         """Cancel the running and the waiting task; returns whether there was one."""
@@ -204,7 +200,7 @@ class Desks:
     """The desks of all studies, by folder.
 
     Attributes:
-        listeners: hear of each change of a job, with the study's folder.
+        listeners: notified of each change of a job, with the study's folder.
     """
 
     listeners: Listeners[tuple[Path, Job]] = field(default_factory=Listeners)

@@ -13,27 +13,14 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-import numpy as np
 
 from rigwatch.wire.host import replace_file
+from rigwatch.wire.typed_files import as_json
 from rigwatch.workbench.study import Study, stands_on
 
 FOLDER = ".workbench"
 KEPT = 24
 """Number of most recently used models whose results are kept."""
-
-
-def as_plain(value: Any) -> Any:
-    """Dataclasses and structs as JSON values; non-finite numbers become None."""
-    return msgspec.json.decode(msgspec.json.encode(value, enc_hook=_plain))
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Path):
-        return str(value)
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    raise NotImplementedError(type(value).__name__)
 
 
 def signal_key(use: str, line: str, channel: str) -> str:
@@ -74,8 +61,7 @@ class Results:
     def write(self, name: str, value: Any) -> None:
         """Write a result as JSON."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        content = msgspec.json.encode(as_plain(value))
-        replace_file(self.folder / f"{name}.json", content, durable=False)
+        replace_file(self.folder / f"{name}.json", as_json(value), durable=False)
 
     @contextmanager
     def whole(self, name: str) -> Iterator[Path]:

@@ -5,11 +5,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from rigwatch.browser.signals import write_trace
 from rigwatch.browser.work.directions import write_directions
-from rigwatch.browser.work.results import Results, as_plain, results_of, signal_key
+from rigwatch.browser.work.results import Results, results_of, signal_key
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare import Bench, Warm, locate, sample_numbers
 from rigwatch.workbench.experiment import Experiment, excitation
@@ -39,7 +40,7 @@ class Worker:
     Attributes:
         folder: the study's.
         progress: called with a line of text as each part begins.
-        shown: called once results can be shown, while the task goes on.
+        shown: called once results can be shown, before the task ends.
         warm: cache of fits for the next task.
     """
 
@@ -131,7 +132,7 @@ class Worker:
         self.progress("making the monitor's model")
         against = model_in_force(Path(rig))
         found = rehearsal(study, Path(rig), self.progress)
-        results_of(study).write("rehearsal", as_plain(found) | {"against": against})
+        results_of(study).write("rehearsal", msgspec.to_builtins(found) | {"against": against})
         raised = f"raises {', '.join(found.alarms)}" if found.alarms else "raises no alarm"
         text = f"over the last {found.seconds:.0f} s the monitor's residual goes from"
         return {"text": f"{text} {found.before:.3g} to {found.after:.3g} m/s^2 and it {raised}"}

@@ -1,18 +1,16 @@
 """A study's process: runs tasks from a pipe, reports progress and results, ends with its parent."""
 
-import os
-import threading
-from multiprocessing import parent_process
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 from rigwatch.browser.work.tasks import TASKS, Worker
 from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.host import end_with_parent
 
 
 def work(pipe: Connection, folder: str) -> None:
     """Execute tasks from the pipe, one after another, until it is closed."""
-    threading.Thread(target=end_with_parent, daemon=True).start()
+    end_with_parent()
     worker = Worker(
         Path(folder),
         lambda text: pipe.send(("progress", text)),
@@ -33,11 +31,3 @@ def _outcome(worker: Worker, task: str, arguments: dict[str, object]) -> tuple[s
         return "failed", str(error)
     except Exception as error:
         return "failed", f"{task}: {type(error).__name__}: {error}"
-
-
-def end_with_parent() -> None:
-    """Let this process end when its server is killed."""
-    parent = parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        os._exit(1)

@@ -2,7 +2,7 @@
 
 import argparse
 
-from rigwatch.commands.common import add_on, print_json, say
+from rigwatch.commands.common import add_on, print_result, say
 
 HELP = "update the catalogue of an archive with new and changed sessions"
 EXAMPLE = """\
@@ -27,13 +27,10 @@ def run(arguments: argparse.Namespace) -> int:
     store = Store(arguments.url)
     with executor_on(arguments.on) as executor:
         done = index(store, executor=executor, say=say)
-    if arguments.json:
-        print_json(done)
-        return 0
-    for remark in done.remarks[:_NAMED]:
-        print(remark)
-    if len(done.remarks) > _NAMED:
-        print(f"and {len(done.remarks) - _NAMED} more: rigwatch archive query {store.url} unsound")
+    lines, more = done.remarks[:_NAMED], len(done.remarks) - _NAMED
+    if more > 0:
+        lines.append(f"and {more} more: rigwatch archive query {store.url} unsound")
     statuses = ", ".join(f"{count} {status}" for status, count in done.statuses.items())
-    print(f"{done.sessions} sessions ({statuses}); {done.read} read, {done.removed} removed")
+    lines.append(f"{done.sessions} sessions ({statuses}); {done.read} read, {done.removed} removed")
+    print_result(arguments, done, lines)
     return 0

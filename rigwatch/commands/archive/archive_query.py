@@ -4,7 +4,7 @@ import argparse
 from datetime import UTC, datetime
 
 from rigwatch.commands.archive.archive_text import table
-from rigwatch.commands.common import POSITIVE, print_json, say, unix_time, whole
+from rigwatch.commands.common import POSITIVE, print_result, say, unix_time, whole
 
 HELP = "query an archive: a named question, or one SELECT on sessions, alarms, losses, seconds"
 EXAMPLE = """\
@@ -39,10 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.query is None:
         questions = {name: question.text for name, question in QUESTIONS.items()}
-        if arguments.json:
-            print_json(questions)
-        else:
-            print("\n".join(table(("question", "answers"), questions.items())))
+        print_result(arguments, questions, table(("question", "answers"), questions.items()))
         return 0
     store = Store(arguments.url)
     bounds = Bounds(rows=arguments.rows, seconds=arguments.seconds)
@@ -53,11 +50,9 @@ def run(arguments: argparse.Namespace) -> int:
         answer = ask(
             store, arguments.query, rig=arguments.rig, since=since, until=until, bounds=bounds
         )
-    if arguments.json:
-        print_json({"columns": answer.columns, "rows": answer.as_dicts(), "more": answer.more})
-        return 0
-    print("\n".join(table(answer.columns, answer.rows)))
-    if answer.more:
+    data = {"columns": answer.columns, "rows": answer.as_dicts(), "more": answer.more}
+    print_result(arguments, data, table(answer.columns, answer.rows))
+    if answer.more and not arguments.json:
         say(f"only the first {bounds.rows} rows; --rows shows more")
     return 0
 

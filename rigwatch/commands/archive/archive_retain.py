@@ -4,7 +4,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from rigwatch.commands.archive.archive_text import table
-from rigwatch.commands.common import number, print_json, say
+from rigwatch.commands.common import number, print_result, say
 from rigwatch.wire.errors import ArchiveError
 
 if TYPE_CHECKING:
@@ -54,10 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
         keep_seconds=arguments.keep_seconds,
         say=say,
     )
-    if arguments.json:
-        print_json(found)
-    else:
-        print("\n".join(_lines(found, removed=arguments.remove)))
+    print_result(arguments, found, _lines(found, removed=arguments.remove))
     for failure in found.failures:
         say(f"failed: {failure}")
     return EXIT_FAILED if found.failures else 0

@@ -3,7 +3,8 @@
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import check_folder, print_json, say
+from rigwatch.commands.catalogue.curves import plot_lines, save_curves
+from rigwatch.commands.common import check_folder, print_result
 
 HELP = "list the effects of the library, or describe and draw one"
 EXAMPLE = """\
@@ -24,8 +25,7 @@ def run(arguments: argparse.Namespace) -> int:
     """0 on success."""
     from rigwatch.physics.engine.equations import library
     from rigwatch.wire.errors import ModelError, nearest
-    from rigwatch.wire.new_file import write_new
-    from rigwatch.workbench.catalogue import described, effect_curves, plotted, text_plot
+    from rigwatch.workbench.catalogue import described, effect_curves
 
     name, known = arguments.name, library()
     if name is None:
@@ -34,19 +34,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise ModelError(f"effects: found {name!r}{nearest(name, known)}")
     check_folder(arguments.save)
     effect, curves = known[name], effect_curves(known[name])
-    if arguments.json:
-        print_json({"name": name, "effect": effect, "curves": [_plain(c) for c in curves]})
-    else:
-        print("\n".join(described(name, effect)))
-        for curve in curves:
-            print("\n" + "\n".join(text_plot(curve)))
+    data = {"name": name, "effect": effect, "curves": curves}
+    print_result(arguments, data, [*described(name, effect), *plot_lines(curves)])
     if arguments.save:
-        for number, curve in enumerate(curves):
-            file = arguments.save.with_suffix("")
-            file = file.with_name(f"{file.name}{f'_{number + 1}' if number else ''}.svg")
-            drawn = plotted(curve, f"{name}: {curve.up} against {curve.across}")
-            write_new(file, drawn, replace=True)
-            say(f"drawn: {file}")
+        save_curves(arguments.save, curves, lambda c: f"{name}: {c.up} against {c.across}")
     return 0
 
 
@@ -54,18 +45,9 @@ def _list(arguments: argparse.Namespace) -> int:
     from rigwatch.workbench.catalogue import KINDS, listed
 
     found = listed()
-    if arguments.json:
-        print_json(found)
-        return 0
+    lines: list[str] = []
     for kind, effects in found.items():
-        print(f"{KINDS[kind]}:")
-        for name, effect in sorted(effects.items()):
-            print(f"  {name:24} {effect.physics}")
+        lines += [f"{KINDS[kind]}:"]
+        lines += (f"  {name:24} {effect.physics}" for name, effect in sorted(effects.items()))
+    print_result(arguments, found, lines)
     return 0
-
-
-def _plain(curve: object) -> dict[str, object]:
-    return {
-        key: value.tolist() if hasattr(value, "tolist") else value
-        for key, value in vars(curve).items()
-    }

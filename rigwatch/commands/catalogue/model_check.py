@@ -4,7 +4,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands.common import check_folder, print_json, say
+from rigwatch.commands.catalogue.curves import plot_lines, save_curves
+from rigwatch.commands.common import check_folder, print_result
 
 if TYPE_CHECKING:
     from rigwatch.workbench.catalogue import ModelReport
@@ -30,24 +31,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0 if nothing is in a fit's way, 1 otherwise."""
     from rigwatch.physics.engine.equations import model_named
-    from rigwatch.wire.new_file import write_new
-    from rigwatch.workbench.catalogue import model_report, plotted, text_plot
+    from rigwatch.workbench.catalogue import model_report
 
     check_folder(arguments.save)
     inputs = dict(map(_value, arguments.input))
     report = model_report(model_named(arguments.model), inputs, arguments.model)
-    if arguments.json:
-        print_json(_plain(report))
-    else:
-        print("\n".join(_lines(arguments.model, report)))
-        for curve in report.run:
-            print("\n" + "\n".join(text_plot(curve)))
+    lines = [*_lines(arguments.model, report), *plot_lines(report.run)]
+    print_result(arguments, _plain(report), lines)
     if arguments.save:
-        for number, curve in enumerate(report.run):
-            file = arguments.save.with_suffix("")
-            file = file.with_name(f"{file.name}{f'_{number + 1}' if number else ''}.svg")
-            write_new(file, plotted(curve, f"{arguments.model}: {curve.up}"), replace=True)
-            say(f"drawn: {file}")
+        save_curves(arguments.save, report.run, lambda curve: f"{arguments.model}: {curve.up}")
     return 0 if report.fine else 1
 
 

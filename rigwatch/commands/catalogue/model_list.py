@@ -2,7 +2,7 @@
 
 import argparse
 
-from rigwatch.commands.common import print_json
+from rigwatch.commands.common import print_result
 
 HELP = "list the models that ship with rigwatch"
 EXAMPLE = "  rigwatch model list"
@@ -18,9 +18,6 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.physics.engine.equations import shipped_models
 
     found = shipped_models()
-    if arguments.json:
-        print_json({name: model.summary for name, model in found.items()})
-        return 0
-    for name, model in sorted(found.items()):
-        print(f"{name:20} {model.summary}")
+    summaries = {name: model.summary for name, model in sorted(found.items())}
+    print_result(arguments, summaries, (f"{name:20} {text}" for name, text in summaries.items()))
     return 0

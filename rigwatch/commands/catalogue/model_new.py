@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import check_folder, print_json
+from rigwatch.commands.common import check_folder, print_result
 
 HELP = "start a model of your own from a copy of a shipped one"
 EXAMPLE = "  rigwatch model new my_rig.toml --like mass-spring-damper"
@@ -29,8 +29,6 @@ def run(arguments: argparse.Namespace) -> int:
     name = model_named(like).name
     text = model_text(like).replace(f'name = "{name}"', f'name = "{file.stem}"', 1)
     write_new(file, text, raises=ModelError)
-    if arguments.json:
-        print_json({"file": file, "like": like})
-    else:
-        print(f"{file}: begun from {like}; next: rigwatch model check {file}")
+    told = f"{file}: begun from {like}; next: rigwatch model check {file}"
+    print_result(arguments, {"file": file, "like": like}, told)
     return 0

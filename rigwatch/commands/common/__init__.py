@@ -1,21 +1,18 @@
 """Shared parts of commands: opening sessions, drawing, progress."""
 
-from rigwatch.commands.common import watched
+from rigwatch.commands.common.batch_options import add_many, add_on, add_where, run_many, the_one
 from rigwatch.commands.common.drawing import ready_to_draw, show_until_closed
 from rigwatch.commands.common.log_arguments import add_log_columns
-from rigwatch.commands.common.many import add_many, add_on, add_where, run_many, the_one
 from rigwatch.commands.common.many_studies import add_studies, run_studies, the_study
 from rigwatch.commands.common.marks import marks_of
 from rigwatch.commands.common.numbers import PORT, POSITIVE, number, whole
+from rigwatch.commands.common.output import check_folder, print_json, print_result, say
 from rigwatch.commands.common.served_page import tell_address
 from rigwatch.commands.common.session_files import (
     add_session_and_target,
     add_span,
-    check_folder,
     damage_lines,
-    print_json,
     report_written,
-    say,
     span_between,
     span_of,
     unix_time,
@@ -38,6 +35,7 @@ __all__ = [
     "marks_of",
     "number",
     "print_json",
+    "print_result",
     "ready_to_draw",
     "report_written",
     "run_many",
@@ -50,6 +48,5 @@ __all__ = [
     "the_one",
     "the_study",
     "unix_time",
-    "watched",
     "whole",
 ]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands.common.session_files import check_folder
+from rigwatch.commands.common.output import check_folder
 
 if TYPE_CHECKING:
     from rigwatch.dashboard.viewer import Choice, ForeignViewer, Viewer

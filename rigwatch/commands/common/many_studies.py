@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from rigwatch.commands.common.many import add_many, run_many, the_one
+from rigwatch.commands.common.batch_options import add_many, run_many, the_one
 
 
 def add_studies(parser: argparse.ArgumentParser) -> None:

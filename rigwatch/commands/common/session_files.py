@@ -1,47 +1,16 @@
-"""Shared parts of commands on session files: times, JSON, descriptions of damage."""
+"""Shared parts of commands on session files: arguments, times, descriptions of damage."""
 
 import argparse
-import sys
 from collections.abc import Iterable
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import msgspec
-
+from rigwatch.commands.common.output import print_result
 from rigwatch.wire.errors import SessionError
 
 if TYPE_CHECKING:
     from rigwatch.wire.session import LostSpan, Session, Written
-
-
-def print_json(value: Any) -> None:
-    """The value, of plain data and dataclasses, as one JSON document; NaN becomes null."""
-    text = msgspec.json.encode(value, enc_hook=_plain, order="deterministic")
-    print(msgspec.json.format(text).decode())
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Path):
-        return str(value)
-    if hasattr(value, "tolist"):  # an array or a number of NumPy
-        return value.tolist()
-    raise NotImplementedError(f"{type(value).__name__} has no JSON form")
-
-
-def say(text: str) -> None:
-    """A remark or progress, on stderr."""
-    print(text, file=sys.stderr, flush=True)
-
-
-def check_folder(target: Path | None) -> None:
-    """Refuse an output file in a missing folder, before long work begins.
-
-    Raises:
-        SessionError: there is no such folder.
-    """
-    if target is not None and not target.absolute().parent.is_dir():
-        raise SessionError(f"{target}: found no folder {target.parent}, expected one to write to")
 
 
 def add_session_and_target(parser: argparse.ArgumentParser) -> None:
@@ -127,14 +96,9 @@ def _between(after_ns: int | None, before_ns: int | None) -> str:
     return f"between {after} and {before}"
 
 
-def report_written(written: "Written", as_json: bool) -> None:
+def report_written(arguments: argparse.Namespace, written: "Written") -> None:
     """The content of a new file, and the lost parts of the old one."""
-    if as_json:
-        print_json(written)
-        return
     counts = ", ".join(f"{name} {count}" for name, count in sorted(written.messages.items()))
-    print(f"{written.path}: {written.samples} samples; messages: {counts}")
-    for line in damage_lines(written.lost):
-        print(line)
-    if written.notes:
-        print(written.notes)
+    head = f"{written.path}: {written.samples} samples; messages: {counts}"
+    notes = [written.notes] if written.notes else []
+    print_result(arguments, written, [head, *damage_lines(written.lost), *notes])

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigwatch.commands.common import POSITIVE, print_json, say, whole
+from rigwatch.commands.common import POSITIVE, print_result, say, whole
 from rigwatch.commands.processes.model_place import check_place, install_model
 
 if TYPE_CHECKING:
@@ -89,12 +89,8 @@ def run(arguments: argparse.Namespace) -> int:
     kept = install_model(arguments.output, model)
     if kept:
         say(f"the model before is {kept}")
-    if arguments.json:
-        print_json(_summary(model, arguments.output))
-    else:
-        print(
-            "\n".join(f"{key}: {value}" for key, value in _summary(model, arguments.output).items())
-        )
+    summary = _summary(model, arguments.output)
+    print_result(arguments, summary, (f"{key}: {value}" for key, value in summary.items()))
     return 0
 
 

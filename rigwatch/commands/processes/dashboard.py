@@ -3,11 +3,10 @@
 import argparse
 import json
 import os
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands.common import PORT
+from rigwatch.commands.common import PORT, say
 from rigwatch.wire.errors import ConfigError, RigwatchError
 
 if TYPE_CHECKING:
@@ -56,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     with joined(config, "dashboard", stop) as bus:
         if bus is None:
             return 0
-        live = LiveDashboard(bus, settings, choice, _say_json if arguments.json else _say, stop)
+        live = LiveDashboard(bus, settings, choice, _say_json if arguments.json else say, stop)
         if config.monitor is not None:
             _know_model(live.facts, config.monitor.model)
         live.run()
@@ -71,11 +70,7 @@ def _know_model(facts: "Facts", path: str) -> None:
     try:
         facts.marks = marks_of(path)
     except ConfigError as error:
-        _say(f"signature and limits are not shown: {error}")
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
+        say(f"signature and limits are not shown: {error}")
 
 
 def _say_json(text: str) -> None:

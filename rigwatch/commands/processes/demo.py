@@ -2,11 +2,10 @@
 
 import argparse
 import json
-import sys
 from contextlib import nullcontext
 from pathlib import Path
 
-from rigwatch.commands.common import POSITIVE
+from rigwatch.commands.common import POSITIVE, say
 
 HELP = "run a simulated rig: friction appears, an alarm names it, a recording remains"
 EXAMPLE = """  rigwatch demo
@@ -44,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     folder: Path = arguments.folder
     folder.mkdir(parents=True, exist_ok=True)
     config = find_config("demo.toml")
-    ensure_model(config, folder, _remark)
+    ensure_model(config, folder, say)
     if arguments.commission_only:
         return 0
     forget_alarms(folder)
@@ -54,13 +53,9 @@ def run(arguments: argparse.Namespace) -> int:
         seconds, after_named = LONGEST, AFTER_NAMED
     if arguments.seconds is not None:
         seconds, after_named = arguments.seconds, float("inf")
-    beside = nullcontext() if arguments.headless else workbench_pages(folder, rig, _remark)
+    beside = nullcontext() if arguments.headless else workbench_pages(folder, rig, say)
     with beside:
-        outcome = Show(rig, folder, _remark).play(seconds, after_named)
+        outcome = Show(rig, folder, say).play(seconds, after_named)
     if arguments.json:
         print(json.dumps(outcome.as_dict(), indent=1))
     return 1 if arguments.headless and outcome.complaints else 0
-
-
-def _remark(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)

@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.serve:
             return _serve(arguments, fleet)
         while True:
-            states = fleet.look()
+            states = fleet.states()
             _show(arguments, states)
             if not arguments.follow:
                 return EXIT_UNWELL if any(state.rank for state in states) else 0
@@ -75,7 +75,7 @@ def _serve(arguments: argparse.Namespace, fleet: "Fleet") -> int:
     def ready(address: str) -> None:
         tell_address(arguments, address)
 
-    serve_fleet(fleet.look, Listening(port=arguments.port), ready)
+    serve_fleet(fleet.states, Listening(port=arguments.port), ready)
     return 0
 
 

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import print_json
+from rigwatch.commands.common import print_result
 
 HELP = "copy the example configurations, scenarios, studies, mappings and structures"
 EXAMPLE = """\
@@ -27,10 +27,10 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.wire.typed_files import copy_out
 
     copied, kept = copy_out(arguments.folder)
-    if arguments.json:
-        print_json({"copied": [str(path) for path in copied], "kept": [str(p) for p in kept]})
-        return 0
     target = arguments.folder / "configs"
-    print(f"{target}: {len(copied)} files copied, {len(kept)} that were there already kept")
-    print("  next: rigwatch demo, or rigwatch study new STUDY --template emps")
+    lines = (
+        f"{target}: {len(copied)} files copied, {len(kept)} that were there already kept",
+        "  next: rigwatch demo, or rigwatch study new STUDY --template emps",
+    )
+    print_result(arguments, {"copied": copied, "kept": kept}, lines)
     return 0

@@ -24,7 +24,7 @@ def check_place(path: Path) -> None:
 
 
 def install_model(path: Path, model: "RigModel") -> str:
-    """Write a model that reads back as it is; name of the file that holds the one before, or "".
+    """Write a model whose text reads back the same; returns the file of the one before, or "".
 
     Raises:
         ConfigError: it cannot be written, or its text is no model.

@@ -20,7 +20,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.wire.rig_config import load_rig
 
     for config in arguments.config:
-        load_rig(config)  # a wrong file is told before the kernels are loaded, which takes seconds
+        load_rig(config)  # report a wrong file before kernels load, which takes seconds
     from monitor.process import run as run_monitor
     from monitor.process import run_several
 

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import print_json
+from rigwatch.commands.common import print_result
 
 HELP = "record samples, estimates, alarms and events of one or several rigs"
 EXAMPLE = """  rigwatch record configs/demo.toml
@@ -32,9 +32,6 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         folders = run_several(paths, stop, arguments.notes)
         result = {"sessions": folders}
-    if arguments.json:
-        print_json(result)
-    else:
-        for one in folders:
-            print(one)
+    if folders or arguments.json:
+        print_result(arguments, result, map(str, folders))
     return 0

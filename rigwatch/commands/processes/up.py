@@ -60,8 +60,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     def each_turn() -> None:
         nonlocal is_ready
-        flow.look()
-        rig_set.look()
+        flow.update()
+        rig_set.check()
         console.status(supervisor, flow)
         if not is_ready and all(w.was_ready for w in supervisor.processes.values()):
             is_ready = True

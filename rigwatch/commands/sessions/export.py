@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import add_span, damage_lines, print_json, say, span_of
+from rigwatch.commands.common import add_span, damage_lines, print_result, say, span_of
 
 HELP = "write a session as CSV, MAT or Parquet, units in the titles"
 EXAMPLE = """\
@@ -37,8 +37,6 @@ def run(arguments: argparse.Namespace) -> int:
     )
     for line in damage_lines(session.lost):
         say(line)
-    if arguments.json:
-        print_json(made)
-    else:
-        print(f"{made.path}: {made.rows} rows of {', '.join(made.columns)}")
+    told = f"{made.path}: {made.rows} rows of {', '.join(made.columns)}"
+    print_result(arguments, made, told)
     return 0

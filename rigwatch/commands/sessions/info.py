@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigwatch.commands.common import damage_lines, print_json
+from rigwatch.commands.common import damage_lines, print_result
 
 if TYPE_CHECKING:
     from rigwatch.wire.messages import RunInfo
@@ -24,10 +24,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.wire.session import open_session, summarise
 
     summary = summarise(open_session(arguments.session))
-    if arguments.json:
-        print_json(_as_data(summary))
-    else:
-        print("\n".join(_lines(summary)))
+    print_result(arguments, _as_data(summary), _lines(summary))
     return 0
 
 

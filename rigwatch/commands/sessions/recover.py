@@ -17,5 +17,5 @@ def run(arguments: argparse.Namespace) -> int:
     """0 with or without damage: the report lists what is lost."""
     from rigwatch.wire.session import open_session, recover
 
-    report_written(recover(open_session(arguments.session), arguments.target), arguments.json)
+    report_written(arguments, recover(open_session(arguments.session), arguments.target))
     return 0

@@ -9,7 +9,7 @@ from rigwatch.commands.common import (
     add_many,
     add_span,
     damage_lines,
-    print_json,
+    print_result,
     run_many,
     say,
     span_between,
@@ -91,14 +91,11 @@ def _run_one(arguments: argparse.Namespace, path: Path) -> int:
     session = open_session(path)
     monitor = monitor_for(session, arguments.model, arguments.config)
     span = span_of(arguments, session)
-    announce = _ignore if arguments.json else _Announcer()
+    announce = _ignore if arguments.json else _announce
     done = replay(session, monitor, span, speed=arguments.speed, out=arguments.out, say=announce)
     for line in damage_lines(done.lost):
         say(line)
-    if arguments.json:
-        print_json(_as_data(done, arguments.out))
-    else:
-        print(_summary(done))
+    print_result(arguments, _as_data(done, arguments.out), _summary(done))
     return 0
 
 
@@ -106,16 +103,14 @@ def _ignore(_: "Alarm") -> None:
     """Print nothing: with --json all results come at the end."""
 
 
-class _Announcer:
-    """Prints each alarm as it occurs."""
+def _announce(alarm: "Alarm") -> None:
+    """Print an alarm as it occurs."""
+    from rigwatch.wire.session import iso_time
 
-    def __call__(self, alarm: "Alarm") -> None:
-        from rigwatch.wire.session import iso_time
-
-        first = ", first" if alarm.first_out else ""
-        state = alarm.state.replace("_", " ")
-        head = f"{iso_time(alarm.t_ns)}  {alarm.severity:8}  {alarm.name}: {state}{first}"
-        print(f"{head} ({alarm.cause})", flush=True)
+    first = ", first" if alarm.first_out else ""
+    state = alarm.state.replace("_", " ")
+    head = f"{iso_time(alarm.t_ns)}  {alarm.severity:8}  {alarm.name}: {state}{first}"
+    print(f"{head} ({alarm.cause})", flush=True)
 
 
 def _summary(done: "Replay") -> str:

@@ -22,5 +22,5 @@ def run(arguments: argparse.Namespace) -> int:
 
     session = open_session(arguments.session)
     start, end = span_of(arguments, session)
-    report_written(trim(session, arguments.target, start, end), arguments.json)
+    report_written(arguments, trim(session, arguments.target, start, end))
     return 0

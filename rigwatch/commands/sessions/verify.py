@@ -60,7 +60,7 @@ def _run_many(arguments: argparse.Namespace) -> int:
 
 
 def verified(file: Path, only: str | None, update: bool) -> list[str]:
-    """What is said of the cases of one of several files.
+    """The verdicts on the cases of one of several files, as lines.
 
     Raises:
         SessionError: a case differs, or has no reference.

@@ -5,7 +5,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands.common import add_span
+from rigwatch.commands.common import add_span, print_json
+from rigwatch.commands.sessions.session_messages import (
+    length_of,
+    messages_of,
+    model_for,
+    rig_of,
+)
 
 if TYPE_CHECKING:
     from rigwatch.dashboard.recording import Drawn
@@ -33,18 +39,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """0 if it is drawn; returns once a window is closed."""
-    from rigwatch.commands.common import print_json, ready_to_draw, say
+    from rigwatch.commands.common import ready_to_draw, say
     from rigwatch.wire.session import open_session
 
     ready_to_draw(arguments.save, arguments.picture)
-    open_session(arguments.session)  # a wrong file is told before a window opens
+    open_session(arguments.session)  # reports a wrong file before a window opens
     drawn = _shown(arguments, _silent if arguments.json else say)
     if arguments.json and drawn:
         print_json(drawn)
     return 0
 
 
-def _silent(text: str) -> None:
+def _silent(_: str) -> None:
     """Print nothing but JSON."""
 
 
@@ -87,7 +93,6 @@ def _in_a_viewer(arguments: argparse.Namespace, say: Callable[[str], None]) -> "
 def _draw(arguments: argparse.Namespace, say: Callable[[str], None], url: str) -> "Drawn":
     """Draw the session into the viewer at `url`, or into the given file."""
     from rigwatch.commands.common import marks_of, span_of
-    from rigwatch.commands.common import watched as _watched
     from rigwatch.dashboard import recording
     from rigwatch.dashboard.board import Facts
     from rigwatch.dashboard.drawn_to import drawn_to
@@ -95,15 +100,14 @@ def _draw(arguments: argparse.Namespace, say: Callable[[str], None], url: str) -
 
     session = open_session(arguments.session)
     span = span_of(arguments, session)
-    model, compute = _watched.model_for(session, span, arguments.model)
-    facts = Facts(_watched.rig_of(session))
+    model, compute = model_for(session, span, arguments.model)
+    facts = Facts(rig_of(session))
     if model is not None:
         facts.model, facts.marks = model.name, marks_of(model)
-    windows = recording.windows_for(_watched.length_of(session, span))
-    messages = _watched.messages_of(session, span, model if compute else None)
-    stream = recording.new_stream(session.path.stem)
+    windows = recording.windows_for(length_of(session, span))
+    messages = messages_of(session, span, model if compute else None)
     bare = arguments.picture is not None
-    with drawn_to(stream, url, arguments.save):
+    with drawn_to(session.path.stem, url, arguments.save) as stream:
         return recording.draw(
             messages, stream, facts, windows, lambda n: say(f"{n} samples drawn"), bare=bare
         )

@@ -2,7 +2,7 @@
 
 import argparse
 
-from rigwatch.commands.common import print_json
+from rigwatch.commands.common import print_result
 from rigwatch.commands.structures.structure_files import (
     add_problem,
     add_report,
@@ -48,13 +48,10 @@ def run(arguments: argparse.Namespace) -> int:
         draw_methods(arguments, problem, results)
     units = units_of(problem)
     written = {m: r if isinstance(r, str) else as_written(r, units) for m, r in results.items()}
-    if arguments.json:
-        print_json(
-            {m: {"error": r} if isinstance(r, str) else plain(r, units) for m, r in written.items()}
-        )
-    else:
-        for method, result in written.items():
-            told = [f"{method}: {result}"] if isinstance(result, str) else lines_of(result, units)
-            print("\n".join(told))
+    lines: list[str] = []
+    for method, result in written.items():
+        lines += [f"{method}: {result}"] if isinstance(result, str) else lines_of(result, units)
+    data = {m: {"error": r} if isinstance(r, str) else plain(r, units) for m, r in written.items()}
+    print_result(arguments, data, lines)
     good = any(not isinstance(r, str) and r.converged for r in results.values())
     return 0 if good else 1

@@ -10,7 +10,7 @@ from rigwatch.commands.common import (
     POSITIVE,
     add_many,
     file_or_name,
-    print_json,
+    print_result,
     run_many,
     say,
     the_one,
@@ -85,12 +85,8 @@ def examined(record: Path, structure: Path, **settings: Any) -> dict[str, Any]:
     from rigwatch.structures.model import load_structure
     from rigwatch.structures.records import read_any
 
-    found = examine(load_structure(structure), read_any(record), Settings(**settings), _ignore)
+    found = examine(load_structure(structure), read_any(record), Settings(**settings))
     return {"damaged": bool(found.damages), "damage_count": len(found.damages)} | _whole(found)
-
-
-def _ignore(_: str) -> None:
-    """Say nothing: the remarks of several records together help nobody."""
 
 
 def _line(found: dict[str, Any]) -> str:
@@ -132,19 +128,14 @@ def _run_one(arguments: argparse.Namespace, record: Path) -> int:
         write_page(arguments.report, page(found, record.name))
     if drawn:
         draw_damage(arguments, found)
-    if arguments.json:
-        print_json(_whole(found))
-    elif not found.damages:
-        print("no damage")
-    else:
-        for damage in found.damages:
-            print("\n".join(damage_lines(damage)))
+    lines = [line for damage in found.damages for line in damage_lines(damage)]
+    print_result(arguments, _whole(found), lines or "no damage")
     return 0
 
 
 def _whole(found: "Examination") -> dict[str, Any]:
     base = found.reference
-    outputs = base.model.problem.sweeper.compiled.system.model.outputs
+    outputs = base.model.problem.system.model.outputs
     return {
         "undamaged": {
             "seconds": base.samples * base.model.dt,

@@ -137,7 +137,7 @@ def subject_of(path: Path) -> "Structure | Model":
 
 def units_of(problem: "Problem") -> dict[str, str]:
     """The unit of each unknown in the file, by name; x(0) has that of the state x."""
-    system = problem.sweeper.compiled.system
+    system = problem.system
     units = {name: p.shown or p.unit for name, p in system.parameters.items()}
     units |= {f"{name}(0)": state.shown or state.unit for name, state in system.states.items()}
     return {name: units[name] for name in problem.names}

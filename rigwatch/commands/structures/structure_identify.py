@@ -2,7 +2,7 @@
 
 import argparse
 
-from rigwatch.commands.common import print_json
+from rigwatch.commands.common import print_result
 from rigwatch.commands.structures.structure_files import (
     add_problem,
     add_report,
@@ -52,10 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
         draw_methods(arguments, problem, {found.method: found})
     units = units_of(problem)
     found = as_written(found, units)
-    if arguments.json:
-        print_json(plain(found, units))
-    else:
-        print("\n".join(lines_of(found, units)))
+    print_result(arguments, plain(found, units), lines_of(found, units))
     return 0 if found.converged else 1
 
 

@@ -52,7 +52,7 @@ def draw_damage(arguments: argparse.Namespace, found: "Examination") -> None:
     model = found.reference.model
     series = damage_signals.modelled(found)
     words, sizes = damage_signals.band(found)
-    units = model.problem.sweeper.compiled.system.model.outputs
+    units = model.problem.system.model.outputs
     outputs = [
         Output(
             name, units[name].unit, model.observed[:, k],
@@ -101,7 +101,7 @@ def draw_methods(
     from rigwatch.dashboard.study_view import Output
     from rigwatch.structures.identification import modelled, seconds_of
 
-    model, observed = problem.sweeper.compiled.system.model, problem.observed
+    model, observed = problem.system.model, problem.observed
     made = {m: modelled(problem, r) for m, r in results.items() if not isinstance(r, str)}
     outputs = [
         Output(
@@ -144,16 +144,17 @@ def _draw(
     story: str,
     judged: "Judged | None" = None,
 ) -> None:
-    from rigwatch.commands.workbench import write_views
+    from rigwatch.commands.workbench import write_picture
     from rigwatch.dashboard import study_view
     from rigwatch.dashboard.drawn_to import drawn_to
 
     def draw(url: str, *, bare: bool = False) -> None:
-        stream = study_view.new_stream(arguments.record.stem)
-        with drawn_to(stream, url, arguments.save):
+        with drawn_to(arguments.record.stem, url, arguments.save) as stream:
             study_view.draw_study(stream, seconds, outputs, story, judged=judged, bare=bare)
 
-    for file in (arguments.save, arguments.picture):
-        if file:
-            write_views(draw, float(seconds[-1]), file if file is arguments.picture else None)
-            say(f"drawn: {file}")
+    if arguments.save:
+        draw("")
+        say(f"drawn: {arguments.save}")
+    if arguments.picture:
+        write_picture(draw, float(seconds[-1]), arguments.picture)
+        say(f"drawn: {arguments.picture}")

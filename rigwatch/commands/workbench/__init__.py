@@ -1,5 +1,5 @@
 """Commands of the workbench."""
 
-from rigwatch.commands.workbench.study_view import write_views
+from rigwatch.commands.workbench.study_view import write_picture
 
-__all__ = ["write_views"]
+__all__ = ["write_picture"]

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import print_json, say
+from rigwatch.commands.common import print_result, say
 
 HELP = "add an effect to the model of a study and refit; refused unless the held-out error falls"
 EXAMPLE = """\
@@ -49,10 +49,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.effect_file is not None:
         study, names = learn(study, arguments.effect_file)
         if arguments.effect is None:
-            if arguments.json:
-                print_json({"step": "effect-file", "effects": names})
-            else:
-                print(f"{study.folder}: will be ranked with the others: {', '.join(names)}")
+            text = f"{study.folder}: will be ranked with the others: {', '.join(names)}"
+            print_result(arguments, {"step": "effect-file", "effects": names}, text)
             return 0
     if arguments.effect is None:
         raise ModelError("add: found no effect, expected its name, or --effect-file")
@@ -60,8 +58,5 @@ def run(arguments: argparse.Namespace) -> int:
         study, arguments.effect, arguments.port, anyway=arguments.anyway,
         beside=arguments.beside, progress=say,
     )  # fmt: skip
-    if arguments.json:
-        print_json(change)
-    else:
-        print("\n".join(change_lines(change)))
+    print_result(arguments, change, change_lines(change))
     return 1 if change.step == "refused" else 0

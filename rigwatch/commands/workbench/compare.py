@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigwatch.commands.common import add_studies, print_json, run_studies, the_study
+from rigwatch.commands.common import add_studies, print_result, run_studies, the_study
 
 if TYPE_CHECKING:
     from rigwatch.workbench.compare import Comparison
@@ -54,8 +54,5 @@ def _run_one(arguments: argparse.Namespace, folder: Path) -> int:
     from rigwatch.workbench.report import comparison_lines
 
     found = compared(folder, arguments.profile)
-    if arguments.json:
-        print_json(found)
-        return 0
-    print("\n".join(comparison_lines(found)))
+    print_result(arguments, found, comparison_lines(found))
     return 0

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from rigwatch.commands.common import add_studies, print_json, run_studies, say, the_study
+from rigwatch.commands.common import add_studies, print_result, run_studies, say, the_study
 
 HELP = "rank the effects that the model may lack and give a verdict"
 EXAMPLE = """\
@@ -43,10 +43,7 @@ def _run_one(arguments: argparse.Namespace, folder: Path) -> int:
     from rigwatch.workbench.study import open_study
 
     found = explain(open_study(folder), progress=say)
-    if arguments.json:
-        print_json(as_data(found))
-        return 0
-    print("\n".join(explanation_lines(found)))
-    if command := next_command(found, f"{folder}"):
-        print(f"next: {command}")
+    command = next_command(found, f"{folder}")
+    lines = [*explanation_lines(found), *([f"next: {command}"] if command else [])]
+    print_result(arguments, as_data(found), lines)
     return 0

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import print_json, whole
+from rigwatch.commands.common import print_result, whole
 
 HELP = "show where a model fails: by time, motion, direction, amplitude, frequency and channel"
 EXAMPLE = "  rigwatch locate emps"
@@ -25,8 +25,5 @@ def run(arguments: argparse.Namespace) -> int:
     found = locate(open_bench(open_study(arguments.study)))
     if arguments.view:
         found = [region for region in found if region.view == arguments.view]
-    if arguments.json:
-        print_json(region_data(found))
-    else:
-        print("\n".join(region_lines(found, arguments.most)))
+    print_result(arguments, region_data(found), region_lines(found, arguments.most))
     return 0

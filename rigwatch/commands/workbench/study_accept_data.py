@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import print_json
+from rigwatch.commands.common import print_result
 
 HELP = "accept recordings that have changed since the last step"
 EXAMPLE = "  rigwatch study accept-data emps"
@@ -19,8 +19,6 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.workbench.study import ledger, open_study
 
     line = ledger.append(open_study(arguments.study), "accept-data")
-    if arguments.json:
-        print_json(line)
-    else:
-        print(f"{arguments.study}: continues with the recordings as they are now")
+    told = f"{arguments.study}: continues with the recordings as they are now"
+    print_result(arguments, line, told)
     return 0

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands.common import print_json, say
+from rigwatch.commands.common import print_json, print_result, say
 
 if TYPE_CHECKING:
     from rigwatch.workbench.study import Study
@@ -41,19 +41,16 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.workbench.steps import take_base
     from rigwatch.workbench.study import open_study
 
-    study, wished = open_study(arguments.study), arguments.take
+    study, wanted = open_study(arguments.study), arguments.take
     if arguments.model_file is not None:
         study = _remodelled(study, arguments)
-        if wished is None:
+        if wanted is None:
             return 0
-    if wished in (None, ENOUGH):
+    if wanted in (None, ENOUGH):
         return _found(study, arguments)
-    names = [] if wished == WRITTEN else [name.strip() for name in wished.split(",")]
+    names = [] if wanted == WRITTEN else [name.strip() for name in wanted.split(",")]
     take_base(study, names)
-    if arguments.json:
-        print_json({"step": "base", "variants": names})
-    else:
-        print(_taken(study, names))
+    print_result(arguments, {"step": "base", "variants": names}, _taken(study, names))
     return 0
 
 
@@ -80,14 +77,12 @@ def _found(study: "Study", arguments: argparse.Namespace) -> int:
     names = found.enough.variants
     if arguments.take:
         take_base(study, names)
-    if arguments.json:
-        print_json(found)
-        return 0
-    print("\n".join(base_lines(found)))
+    lines = base_lines(found)
     if arguments.take:
-        print(_taken(study, names))
+        lines.append(_taken(study, names))
     elif set(names) != set(study.file.variants):
-        print(f"to take it: rigwatch study base {arguments.study} --take {ENOUGH}")
+        lines.append(f"to take it: rigwatch study base {arguments.study} --take {ENOUGH}")
+    print_result(arguments, found, lines)
     return 0
 
 

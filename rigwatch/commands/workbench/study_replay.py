@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import print_json, say
+from rigwatch.commands.common import print_result, say
 
 HELP = "refit every step of a study and compare with its ledger"
 EXAMPLE = "  rigwatch study replay emps"
@@ -20,9 +20,6 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.workbench.study import open_study
 
     checks = replay(open_study(arguments.study), progress=say)
-    if arguments.json:
-        print_json(checks)
-    else:
-        for check in checks:
-            print(f"{'same' if check.same else 'DIFFERS'}: {check.text}")
+    told = (f"{'same' if check.same else 'DIFFERS'}: {check.text}" for check in checks)
+    print_result(arguments, checks, told)
     return 0 if all(check.same for check in checks) else 1

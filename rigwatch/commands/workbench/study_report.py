@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import print_json, say
+from rigwatch.commands.common import print_result, say
 
 HELP = "write the whole study as one HTML page that needs no network"
 EXAMPLE = "  rigwatch study report emps --output emps.html"
@@ -26,9 +26,10 @@ def run(arguments: argparse.Namespace) -> int:
     path = arguments.output or study.folder / "report.html"
     found = write_report(study, path, progress=say)
     last = found.stages[-1].comparison
-    if arguments.json:
-        print_json({"file": path, "verdict": found.explanation.verdict, "comparison": last})
-        return 0
     error = f"{last.held_out_error:.4g} {last.unit}"
-    print(f"{path}: {len(found.stages)} steps, held-out error {error}")
+    print_result(
+        arguments,
+        {"file": path, "verdict": found.explanation.verdict, "comparison": last},
+        f"{path}: {len(found.stages)} steps, held-out error {error}",
+    )
     return 0

@@ -45,23 +45,20 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def write_views(draw: Callable[..., None], end: float, picture: Path | None) -> None:
-    """Draw into a headless viewer for a picture, else into a file.
+def write_picture(draw: "Callable[..., None]", end: float, file: Path) -> None:
+    """Draw into a viewer without a window, and write what it shows.
 
     Args:
-        draw: takes the viewer's address, "" for the file.
+        draw: takes the viewer's address.
         end: end of the data [s].
-        picture: picture file to write.
+        file: picture file to write.
     """
     from rigwatch.dashboard import recording, study_view
 
-    if picture is None:
-        draw("")
-        return
     viewer = recording.headless_viewer()
     try:
         draw(viewer.url, bare=True)
-        study_view.take_picture(viewer, end, picture)
+        study_view.take_picture(viewer, end, file)
     finally:
         viewer.stop()
 
@@ -73,13 +70,15 @@ def _show(
     from rigwatch.dashboard.drawn_to import drawn_to
 
     def draw(url: str, *, bare: bool = False) -> None:
-        stream = study_view.new_stream(study.folder.resolve().name)
         outputs = _outputs(study, found, shown)
-        with drawn_to(stream, url, arguments.save):
+        with drawn_to(study.folder.resolve().name, url, arguments.save) as stream:
             study_view.draw_study(stream, shown[0].time, outputs, _story(found), bare=bare)
 
-    if arguments.picture or arguments.save:
-        write_views(draw, float(shown[0].time[-1]), arguments.picture)
+    if arguments.picture:
+        write_picture(draw, float(shown[0].time[-1]), arguments.picture)
+        return
+    if arguments.save:
+        draw("")
         return
 
     def draw_into(viewer: "Viewer | ForeignViewer") -> str:

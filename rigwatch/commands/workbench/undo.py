@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import print_json, say
+from rigwatch.commands.common import print_result, say
 
 HELP = "remove the last effect from the model of a study"
 EXAMPLE = "  rigwatch undo emps"
@@ -21,8 +21,5 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.workbench.study import open_study
 
     change = undo(open_study(arguments.study), say)
-    if arguments.json:
-        print_json(change)
-    else:
-        print("\n".join(change_lines(change)))
+    print_result(arguments, change, change_lines(change))
     return 0

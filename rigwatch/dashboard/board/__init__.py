@@ -4,7 +4,7 @@ from rigwatch.dashboard.board import entities, palette
 from rigwatch.dashboard.board.alarm_book import NAMED_FAULTS, is_active
 from rigwatch.dashboard.board.board import APPLICATION, Dashboard
 from rigwatch.dashboard.board.facts import Facts
-from rigwatch.dashboard.board.layout import Windows
+from rigwatch.dashboard.board.layout import Windows, screen
 
 __all__ = [
     "APPLICATION",
@@ -15,4 +15,5 @@ __all__ = [
     "entities",
     "is_active",
     "palette",
+    "screen",
 ]

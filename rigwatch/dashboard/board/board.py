@@ -11,7 +11,7 @@ import numpy as np
 import rerun as rr
 
 from rigwatch.dashboard.board import entities as at
-from rigwatch.dashboard.board import quantities, words
+from rigwatch.dashboard.board import log_lines, quantities
 from rigwatch.dashboard.board.batches import Batches
 from rigwatch.dashboard.board.facts import Facts
 from rigwatch.dashboard.board.health import counters, entity
@@ -127,7 +127,7 @@ class Dashboard:
         self.facts.book.record(alarm)
         self._reach(alarm.t_ns, alarm.t_ns)
         self._lanes.alarm(alarm)
-        self._line(at.LOG, alarm.t_ns, words.alarm_line(alarm), words.alarm_level(alarm))
+        self._line(at.LOG, alarm.t_ns, log_lines.alarm_line(alarm), log_lines.alarm_level(alarm))
         self._keep_up(changed=True)
 
     def _health(self, health: Health) -> None:
@@ -147,10 +147,10 @@ class Dashboard:
     def _event(self, event: Event) -> None:
         self.facts.book.hear(event)
         text = f"{event.source}: {event.text}"
-        self._line(at.EVENTS, event.t_ns, text, words.LEVELS[event.severity])
+        self._line(at.EVENTS, event.t_ns, text, log_lines.LEVELS[event.severity])
 
     def _gap(self, gap: Gap) -> None:
-        self._line(at.EVENTS, gap.t_ns, words.gap_line(gap), words.LEVELS["warning"])
+        self._line(at.EVENTS, gap.t_ns, log_lines.gap_line(gap), log_lines.LEVELS["warning"])
 
     def _run(self, run: RunInfo) -> None:
         self.facts.rig = run.rig

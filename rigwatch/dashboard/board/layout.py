@@ -39,11 +39,29 @@ def blueprint(plan: Sequence[PlotPlan], windows: Windows, *, bare: bool) -> rrb.
         windows: their time span.
         bare: hide the controls of the viewer.
     """
+    return screen(
+        rrb.Tabs(*_tabs(plan, windows), active_tab=0), at.TIMELINE, follow=True, bare=bare
+    )
+
+
+def screen(
+    content: rrb.Container, timeline: str, *, follow: bool = False, bare: bool
+) -> rrb.Blueprint:
+    """The viewer's screen with this content and none of its own views.
+
+    Args:
+        content: views.
+        timeline: the timeline shown.
+        follow: keep the cursor at the newest data.
+        bare: hide the controls of the viewer.
+    """
     return rrb.Blueprint(
-        rrb.Tabs(*_tabs(plan, windows), active_tab=0),
+        content,
         rrb.TopPanel(state="hidden" if bare else "expanded"),
         rrb.TimePanel(
-            state="hidden" if bare else "collapsed", timeline=at.TIMELINE, play_state="following"
+            state="hidden" if bare else "collapsed",
+            timeline=timeline,
+            play_state="following" if follow else None,
         ),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),

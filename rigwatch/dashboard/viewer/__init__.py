@@ -1,7 +1,7 @@
 """The Rerun viewer: start it, find it, serve it as a page, take pictures of it."""
 
 from rigwatch.dashboard.viewer.opening import Choice, open_viewer
-from rigwatch.dashboard.viewer.picture import save_picture
+from rigwatch.dashboard.viewer.picture import await_data, save_picture
 from rigwatch.dashboard.viewer.viewer import RECORDING_MEMORY, ForeignViewer, Viewer, ViewerError
 
 __all__ = [
@@ -10,6 +10,7 @@ __all__ = [
     "ForeignViewer",
     "Viewer",
     "ViewerError",
+    "await_data",
     "open_viewer",
     "save_picture",
 ]

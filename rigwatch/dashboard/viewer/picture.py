@@ -1,4 +1,4 @@
-"""Pictures of what a headless viewer shows."""
+"""What a viewer shows: when it has received its data, and as a picture."""
 
 import io
 import time
@@ -7,12 +7,39 @@ from pathlib import Path
 from PIL import Image
 from rerun.experimental import ViewerClient
 
+from rigwatch.dashboard.viewer.viewer import ViewerError
 from rigwatch.wire.new_file import new_file
 
 _EMPTY_TOP = 36
 """Height of the viewer's own bar [pixels]."""
 _FRAMES, _FRAME = 48, 0.125
 """Number of frames, and time for each [s], after which the viewer's notices disappear."""
+
+
+_ARRIVAL_TIMEOUT = 60.0
+
+
+def await_data(client: ViewerClient, timeline: str, end_ns: float) -> None:
+    """Wait until a viewer has received the data up to `end_ns` of a timeline.
+
+    Raises:
+        ViewerError: it does not receive them in time.
+    """
+    deadline = time.monotonic() + _ARRIVAL_TIMEOUT
+    while _end_of(client, timeline) < end_ns:
+        if time.monotonic() > deadline:
+            raise ViewerError("the viewer did not take all data in time")
+        time.sleep(0.1)
+
+
+def _end_of(client: ViewerClient, name: str) -> int:
+    ends = [
+        timeline.end or 0
+        for recording in client.get_state().recordings
+        for timeline in recording.timelines
+        if timeline.name == name
+    ]
+    return max(ends, default=0)
 
 
 def save_picture(client: ViewerClient, path: Path) -> None:

@@ -18,7 +18,7 @@ from typing import IO, Literal, Self
 
 from rigwatch.dashboard.viewer.viewer_page import HOST, Page
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.wire.host import free_ports
+from rigwatch.wire.host import end_process, free_ports, last_line
 
 _PICTURE = "1600x1000"
 _START_TIMEOUT = 30.0
@@ -120,18 +120,11 @@ class Viewer:
         """End the process; kill it if it does not respond."""
         if self._page is not None:
             self._page.close()
-        self._process.terminate()
-        try:
-            self._process.wait(_STOP_TIMEOUT)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        end_process(self._process, _STOP_TIMEOUT)
 
     def last_words(self) -> str:
         """The last line of its output."""
-        self._words.seek(0)
-        lines = self._words.read().decode(errors="replace").strip().splitlines()
-        return lines[-1] if lines else "it said nothing"
+        return last_line(self._words) or "it said nothing"
 
     def _options(self) -> list[str]:
         options = ["--bind", HOST, "--port", str(self.port), "--hide-welcome-screen"]

@@ -105,7 +105,7 @@ def examine(
     progress: Callable[[str], None] = lambda _: None,
     model: SpringModel | None = None,
 ) -> Examination:
-    """Look for damages in a record.
+    """Search a record for damages.
 
     Args:
         structure: the undamaged structure.
@@ -200,15 +200,15 @@ class _Search:
         places = [f"{c.name}: {c.before:g} -> {c.after:g}" for c in ranking.changed]
         self.progress(f"most likely {' and '.join(places)}")
         when = instant(model, self._changed(estimate, best.refit), watch, alarm, self.base.sigma)
-        refit = self._refitted(estimate, path, ranking, when.sample)
+        first = max(ranking.first, min(when.sample, ranking.last - SHORTEST))
+        refit = self._refitted(estimate, path, ranking, first)
         figures = _figures(refit)
         before = {n: estimate.figures.get(n, self._taken(estimate, n)) for n in figures}
         self.damages.append(
             Damage(alarm.sample * dt, when, ranking, figures, before, explained, ranking.last * dt)
         )
-        follow = max(ranking.first, min(when.sample, ranking.last - SHORTEST))
         return _Estimate(
-            self._changed(estimate, refit), refit.state, follow, self._spread(refit),
+            self._changed(estimate, refit), refit.state, first, self._spread(refit),
             {**estimate.figures, **figures}, ranking.last,
         )  # fmt: skip
 
@@ -306,33 +306,27 @@ class _Search:
         return watch.alarm is None
 
     def _refitted(
-        self, estimate: _Estimate, path: FloatArray, ranking: Ranking, onset: int
+        self, estimate: _Estimate, path: FloatArray, ranking: Ranking, first: int
     ) -> Refit:
-        """The changed coefficient and those marked in the file, from the instant on."""
+        """The changed coefficient and those marked in the file, from sample `first` on."""
         best, known = ranking.best, self.base.model.candidates
-        first = max(ranking.first, min(onset, ranking.last - SHORTEST))
         marked = {n: f.value for n, f in estimate.figures.items() if n in known}
         state = path[first] if best.refit is None or first != ranking.first else best.refit.state
         stretch = self._stretch(estimate, first, ranking.last)
         return stretch.refit({**marked, **{c.name: c.after for c in ranking.changed}}, state)
 
     def _changed(self, estimate: _Estimate, refit: Refit | None) -> FloatArray:
-        parameters = estimate.parameters.copy()
-        names = list(self.base.model.problem.sweeper.compiled.system.parameters)
-        for name, value in (refit.values if refit else {}).items():
-            parameters[names.index(name)] = value
-        return parameters
+        return self.base.model.changed(estimate.parameters, refit.values if refit else {})
 
     def _taken(self, estimate: _Estimate, name: str) -> Figure:
-        names = list(self.base.model.problem.sweeper.compiled.system.parameters)
-        return Figure(float(estimate.parameters[names.index(name)]), float("nan"), float("nan"))
+        value = self.base.model.value(estimate.parameters, name)
+        return Figure(value, float("nan"), float("nan"))
 
     def _spread(self, refit: Refit) -> FloatArray:
         """The refit's covariance, expanded to all coefficients and states."""
-        known = self.base.model.candidates
-        n = len(refit.state)
-        spread = np.zeros((len(known) + n, len(known) + n))
-        at = [*(known.index(name) for name in refit.names), *range(len(known), len(known) + n)]
+        count = len(self.base.model.candidates) + len(refit.state)
+        spread = np.zeros((count, count))
+        at = self.base.model.columns(refit.names)
         spread[np.ix_(at, at)] = refit.covariance
         return spread
 

@@ -41,7 +41,7 @@ class Innovations:
     ) -> None:
         self._problem, self._sigma = model.problem, sigma
         self._parameters, self._state = parameters.copy(), state.copy()
-        names = list(model.problem.sweeper.compiled.system.parameters)
+        names = list(model.problem.system.parameters)
         self._places = [names.index(name) for name in model.candidates]
         self._factor = _factor(spread)
 
@@ -55,7 +55,7 @@ class Innovations:
             dt: time between samples [s].
             row: number of the sample.
             observed: signals at the sample, shape (m,).
-            learnt: whether the estimates come from this sample too: it tells nothing more.
+            learnt: whether the estimates come from this sample too: it adds no information.
         """
         count, sweeper = len(self._sigma), self._problem.sweeper
         outputs, slopes = sweeper.observe(inputs, dt, row, self._state, self._parameters)

@@ -114,7 +114,7 @@ def locate(stretch: Stretch, path: FloatArray) -> Ranking:
         stretch: data after the damage, with the undamaged parameters.
         path: the undamaged model's states over the whole record, shape (samples, n).
     """
-    model, count = stretch.model, len(stretch.model.candidates)
+    model = stretch.model
     residual, rows, fitted, scores = scored(stretch, path)
     shifts = first_states(residual, rows, np.diag(scores.strength))
     state = model.shown_state(path, stretch.first)
@@ -128,7 +128,7 @@ def locate(stretch: Stretch, path: FloatArray) -> Ranking:
         done[0] = _refitted(stretch, done[0], done[0].refit.state)
     left = {c.name: c.refit.chi2 for c in done if c.refit is not None}
     best = _with_class(done[0], model, left)
-    weak = _unseen(model, stretch, rows, fitted, count)
+    weak = _unseen(stretch, rows, fitted)
     return Ranking((best, *done[1:], *listed[len(chosen) :]), stretch.first, stretch.last, weak)
 
 
@@ -166,8 +166,7 @@ def first_states(residual: FloatArray, rows: FloatArray, changes: FloatArray) ->
 
 def _first_pass(stretch: Stretch, found: Standing) -> Candidate:
     model, name = stretch.model, found.label
-    names = list(model.problem.sweeper.compiled.system.parameters)
-    before = float(stretch.parameters[names.index(name)])
+    before = model.value(stretch.parameters, name)
     spring, kind = split(name, model.structure)
     after, nan = before + found.strength, float("nan")
     return Candidate(
@@ -214,17 +213,15 @@ def _with_class(best: Candidate, model: SpringModel, left: Mapping[str, float]) 
     return replace(best, alike=tuple(alike))
 
 
-def _unseen(
-    model: SpringModel, stretch: Stretch, rows: FloatArray, fitted: Projector, count: int
-) -> tuple[str, ...]:
+def _unseen(stretch: Stretch, rows: FloatArray, fitted: Projector) -> tuple[str, ...]:
     """Springs whose loss of a tenth of their stiffness the record would not show."""
-    names = list(model.problem.sweeper.compiled.system.parameters)
+    model, count = stretch.model, len(stretch.model.candidates)
     left = fitted.clean(rows[None, :, :count])
     size = np.linalg.norm(left, axis=0)
     limit = np.sqrt(chi2.isf(0.01 / count, 1))
     weak = []
     for index, name in enumerate(model.candidates):
-        value = stretch.parameters[names.index(name)]
+        value = model.value(stretch.parameters, name)
         if name in model.structure.springs and 0.1 * abs(value) * size[index] < limit:
             weak.append(name)
     return tuple(weak)

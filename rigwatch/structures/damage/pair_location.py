@@ -86,14 +86,9 @@ def _pairs(
 
 
 def _start(stretch: Stretch, names: list[str], change: FloatArray) -> dict[str, float]:
-    springs = stretch.model.structure.springs
-    values = {n: _before(stretch, n) + float(c) for n, c in zip(names, change, strict=True)}
-    return {n: max(v, 0.0) if n in springs else v for n, v in values.items()}
-
-
-def _before(stretch: Stretch, name: str) -> float:
-    known = list(stretch.model.problem.sweeper.compiled.system.parameters)
-    return float(stretch.parameters[known.index(name)])
+    model, before = stretch.model, stretch.parameters
+    values = {n: model.value(before, n) + float(c) for n, c in zip(names, change, strict=True)}
+    return {n: max(v, 0.0) if n in model.structure.springs else v for n, v in values.items()}
 
 
 def _ranked(

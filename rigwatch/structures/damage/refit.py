@@ -74,7 +74,7 @@ class Stretch:
             steps: most Gauss-Newton steps.
         """
         names = tuple(start)
-        columns = self._columns(names)
+        columns = self.model.columns(names)
         now = np.concatenate([np.array(list(start.values())), state])
         errors, slopes = self._errors(names, now)
         if not _finite(errors, slopes):
@@ -93,23 +93,13 @@ class Stretch:
                 break
         return self._result(names, now, errors, slopes)
 
-    def _columns(self, names: Sequence[str]) -> list[int]:
-        known, n = self.model.candidates, len(self.model.start())
-        return [*(known.index(name) for name in names), *range(len(known), len(known) + n)]
-
     def _errors(self, names: Sequence[str], now: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Scaled errors (samples, m) and slopes (samples, m, c + n)."""
-        parameters = self._with(names, now)
+        values = dict(zip(names, now.tolist(), strict=False))
+        parameters = self.model.changed(self.parameters, values)
         run = self.model.run(parameters, now[len(names) :], self.first, self.last)
         errors = (self.model.observed[self.first : self.last] - run.outputs) / self.sigma
         return errors, run.slopes / self.sigma[:, None]
-
-    def _with(self, names: Sequence[str], now: FloatArray) -> FloatArray:
-        parameters = self.parameters.copy()
-        known = list(self.model.problem.sweeper.compiled.system.parameters)
-        for name, value in zip(names, now, strict=False):
-            parameters[known.index(name)] = value
-        return parameters
 
     def _shorter(
         self, names: Sequence[str], now: FloatArray, change: FloatArray, cost: float
@@ -138,7 +128,7 @@ class Stretch:
     def _result(
         self, names: tuple[str, ...], now: FloatArray, errors: FloatArray, slopes: FloatArray
     ) -> Refit:
-        columns = self._columns(names)
+        columns = self.model.columns(names)
         weight, ones = np.ones(len(errors)), np.ones(errors.shape[1])
         last = solve(errors, slopes[..., columns], weight, ones, least_variance=1.0)
         deviations = np.sqrt(np.maximum(np.diag(last.covariance), 0.0))

@@ -5,7 +5,7 @@ and cubic coefficients of all springs are its free parameters. Its outputs are t
 then the positions and velocities of all other nodes, so that states can be read from them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import msgspec
@@ -59,7 +59,7 @@ class SpringModel:
     @property
     def candidates(self) -> tuple[str, ...]:
         """Names of the spring coefficients, in the order of the kernel's slopes."""
-        return tuple(self.problem.sweeper.compiled.system.free)
+        return tuple(self.problem.system.free)
 
     @property
     def dt(self) -> float:
@@ -78,14 +78,30 @@ class SpringModel:
         """All parameters, with those in `values` replaced; shape (n_p,)."""
         return self.problem.sweeper.compiled.vector(values)
 
+    def value(self, parameters: FloatArray, name: str) -> float:
+        """One of all parameters (n_p,), by its name."""
+        return float(parameters[list(self.problem.system.parameters).index(name)])
+
+    def changed(self, parameters: FloatArray, values: Mapping[str, float]) -> FloatArray:
+        """All parameters (n_p,), with those in `values` replaced."""
+        names, found = list(self.problem.system.parameters), parameters.copy()
+        for name, value in values.items():
+            found[names.index(name)] = value
+        return found
+
+    def columns(self, names: Sequence[str]) -> list[int]:
+        """Columns of some spring coefficients, and of all states, in the kernel's slopes."""
+        known, n = self.candidates, len(self.start())
+        return [*(known.index(name) for name in names), *range(len(known), len(known) + n)]
+
     def start(self) -> FloatArray:
         """States at rest as the structure file has them, shape (n,)."""
-        states = self.problem.sweeper.compiled.system.states.values()
+        states = self.problem.system.states.values()
         return np.array([state.start for state in states], np.float64)
 
     def run(self, parameters: FloatArray, state: FloatArray, first: int, last: int) -> Run:
         """Simulate from `state` at sample `first` to the sample before `last`."""
-        recording, system = self.problem.recording, self.problem.sweeper.compiled.system
+        recording, system = self.problem.recording, self.problem.system
         made = self.problem.sweeper.compiled.simulate(
             recording.inputs, recording.dt, np.array([first]), last - first,
             initial=state[None], parameters=parameters, substeps=FINER * self.problem.substeps,
@@ -131,7 +147,7 @@ class SpringModel:
         return np.asarray(self._observed_path(path)[at])
 
     def _observed_path(self, path: FloatArray) -> FloatArray:
-        system, names = self.problem.sweeper.compiled.system, self.signals
+        system, names = self.problem.system, self.signals
         shown = initial_states(system, self.problem.recording)
         for index, state in enumerate(system.states.values()):
             if state.measured not in names and state.rate_of not in names:
@@ -169,7 +185,7 @@ def spring_model(
 
 def with_record(model: SpringModel, record: Record) -> SpringModel:
     """The same kernel with another record of the same signals and time step."""
-    equations = model.problem.sweeper.compiled.system.model
+    equations = model.problem.system.model
     wanted = {*model.signals, *(i.channel or name for name, i in equations.inputs.items())}
     kept = {name: column for name, column in record.columns.items() if name in wanted}
     recording = Record(record.dt, kept).recording(equations)

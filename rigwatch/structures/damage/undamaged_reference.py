@@ -138,7 +138,7 @@ def _settled(turns: Sequence[FloatArray], covariance: FloatArray) -> bool:
 
 def _spread(model: SpringModel, names: tuple[str, ...], covariance: FloatArray) -> FloatArray:
     """The covariance, expanded to all spring coefficients and states."""
-    states = [f"{state}(0)" for state in model.problem.sweeper.compiled.system.states]
+    states = [f"{state}(0)" for state in model.problem.system.states]
     places = {name: index for index, name in enumerate((*model.candidates, *states))}
     spread = np.zeros((len(places), len(places)))
     kept = [index for index, name in enumerate(names) if name in places]

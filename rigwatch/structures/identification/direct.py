@@ -32,7 +32,7 @@ def solve(problem: Problem, *, iterations: int = 25) -> Outcome:
         ModelError: an initial state is unknown, no signal shows a state, or the record does not
             determine the unknowns.
     """
-    system = problem.sweeper.compiled.system
+    system = problem.system
     if len(problem.loose):
         raise ModelError(
             f"{system.model.name}: direct cannot identify initial states, expected known ones"
@@ -59,7 +59,7 @@ def solve(problem: Problem, *, iterations: int = 25) -> Outcome:
 
 def motion(problem: Problem) -> tuple[FloatArray, FloatArray]:
     """States and their rates from the record, each of shape (samples, n)."""
-    system = problem.sweeper.compiled.system
+    system = problem.system
     signals = _measured(problem)
     states = list(system.states)
     for _ in states:
@@ -88,7 +88,7 @@ def motion(problem: Problem) -> tuple[FloatArray, FloatArray]:
 
 def _measured(problem: Problem) -> dict[sympy.Expr, FloatArray]:
     """The signals of the record, by meaning: a state, or the rate of one."""
-    system = problem.sweeper.compiled.system
+    system = problem.system
     rates = set(system.derivatives.values())
     known = {symbol(name) for name in system.states} | rates
     return {

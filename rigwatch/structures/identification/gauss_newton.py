@@ -38,7 +38,7 @@ def solve(problem: Problem, *, iterations: int = 25, trust: float = 0.0) -> Outc
     seen = np.isfinite(problem.observed).any(axis=0)
     scale = np.nanstd(np.where(seen, problem.observed, 0.0), axis=0)
     scale = np.where(scale > 0, scale, 1.0)
-    name = problem.sweeper.compiled.system.model.name
+    name = problem.system.model.name
     for turn in range(iterations):
         outputs, slopes = problem.simulate(found[-1], problem.substeps)
         if not np.isfinite(slopes).all():

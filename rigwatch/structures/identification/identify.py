@@ -9,7 +9,7 @@ Each method is a function from a `Problem` to an `Outcome`; `METHODS` lists them
 import importlib
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -78,7 +78,7 @@ class Identification:
     converged: bool
     seconds: float
     remarks: tuple[str, ...] = ()
-    undetermined: tuple[str, ...] = field(default=())
+    undetermined: tuple[str, ...] = ()
 
 
 def identify(
@@ -89,8 +89,6 @@ def identify(
     guess: Mapping[str, float] | None = None,
     *,
     weighting: str = "uniform",
-    first: int = 0,
-    substeps: int | None = None,
     **options: Any,
 ) -> Identification:
     """Identify the unknowns of a structure from a record of its motion.
@@ -102,17 +100,13 @@ def identify(
         unknowns: their names; those marked in the file if None.
         guess: initial guesses; the file's for those left out.
         weighting: uniform, exponential:SECONDS or jacobi:A,B.
-        first: first sample that counts.
-        substeps: integration steps per sample, for methods that allow a choice; automatic if None.
         options: options of the method.
 
     Raises:
         ModelError: the method or a name is unknown, the record is unsuitable, or it cannot
             determine that many unknowns.
     """
-    problem = problem_of(
-        structure, record, unknowns, guess, weighting=weighting, first=first, substeps=substeps
-    )
+    problem = problem_of(structure, record, unknowns, guess, weighting=weighting)
     return solved(method, problem, **options)
 
 

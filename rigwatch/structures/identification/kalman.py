@@ -47,7 +47,7 @@ def solve(
     """
     run = _Filter(problem, noise, drift)
     if not np.nanmax(run.variance, initial=0.0) > 0:
-        name = problem.sweeper.compiled.system.model.name
+        name = problem.system.model.name
         raise ModelError(f"{name}: found signals that never change, expected a record of motion")
     found, covariance = [problem.guess], run.prior(problem.guess, spread)
     for turn in range(iterations):

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rigwatch.physics.engine.equations import Model, compose
+from rigwatch.physics.engine.equations import Model, System, compose
 from rigwatch.physics.engine.fit import Recording, initial_states
 from rigwatch.structures.identification.sweep import Sweeper, sweeper
 from rigwatch.structures.model import Structure, coefficients, to_model, with_unknowns
@@ -70,17 +70,21 @@ class Problem:
     speed: Speed
 
     @property
+    def system(self) -> System:
+        """The equations."""
+        return self.sweeper.compiled.system
+
+    @property
     def names(self) -> tuple[str, ...]:
         """The unknowns: free parameters, then initial states."""
-        system = self.sweeper.compiled.system
-        states = list(system.states)
-        return (*system.free, *(f"{states[index]}(0)" for index in self.loose))
+        states = list(self.system.states)
+        return (*self.system.free, *(f"{states[index]}(0)" for index in self.loose))
 
     @property
     def free(self) -> IntArray:
         """Indices of the free parameters, shape (m,)."""
-        names = list(self.sweeper.compiled.system.parameters)
-        return np.array([names.index(n) for n in self.sweeper.compiled.system.free], np.int64)
+        names = list(self.system.parameters)
+        return np.array([names.index(name) for name in self.system.free], np.int64)
 
     @property
     def guess(self) -> FloatArray:
@@ -100,12 +104,12 @@ class Problem:
     @cached_property
     def shown(self) -> FloatArray:
         """All states from the record, shape (all samples, n)."""
-        return initial_states(self.sweeper.compiled.system, self.recording)
+        return initial_states(self.system, self.recording)
 
     @cached_property
     def hidden(self) -> NDArray[np.bool_]:
         """States of nodes whose position and velocity are not in the record, shape (n,)."""
-        system, outputs = self.sweeper.compiled.system, self.recording.outputs
+        system, outputs = self.system, self.recording.outputs
         there = [bool(np.isfinite(column).any()) for column in outputs.T]
         channels = {
             output.channel or name
@@ -121,6 +125,11 @@ class Problem:
         count = len(self.free)
         parameters[self.free], initial[self.loose] = unknowns[:count], unknowns[count:]
         return parameters, initial
+
+    def bounded(self, values: FloatArray) -> FloatArray:
+        """Values of the free parameters, shape (m,), clipped to their bounds."""
+        free = [self.system.parameters[name] for name in self.system.free]
+        return np.clip(values, [p.low for p in free], [p.high for p in free])
 
     def simulate(self, unknowns: FloatArray, substeps: int) -> tuple[FloatArray, FloatArray]:
         """Outputs from `first` on, and their derivatives by the unknowns.
@@ -216,14 +225,14 @@ def require_fine_enough(problem: Problem, omega: float, limit: float, reason: st
     dt = problem.recording.dt
     if omega * dt > limit:
         raise ModelError(
-            f"{problem.sweeper.compiled.system.model.name}: found a time step of {dt:g} s, expected"
+            f"{problem.system.model.name}: found a time step of {dt:g} s, expected"
             f" at most {limit / omega:.2g} s: {reason} for its fastest motion of {omega:.3g} rad/s"
         )
 
 
 def _substeps(problem: Problem, omega: float) -> int:
     """Integration steps per sample, for the fastest motion and the fastest sine of the loads."""
-    system, dt = problem.sweeper.compiled.system, problem.recording.dt
+    system, dt = problem.system, problem.recording.dt
     loads = [
         abs(parameter.value)
         for name, parameter in system.parameters.items()
@@ -237,7 +246,7 @@ def _require_samples(problem: Problem) -> None:
     valid = int(np.isfinite(problem.observed).sum())
     if valid < len(problem.names):
         raise ModelError(
-            f"{problem.sweeper.compiled.system.model.name}: found {len(problem.names)} unknowns and"
+            f"{problem.system.model.name}: found {len(problem.names)} unknowns and"
             f" {valid} samples, expected at least as many samples"
         )
 

@@ -57,7 +57,7 @@ def solve(
     follower = _Nominal(problem, integrator_of(integrator))
     wanted = np.ones(problem.observed.shape[1]) if scale is None else scale
     found, step = [problem.guess], None
-    name = problem.sweeper.compiled.system.model.name
+    name = problem.system.model.name
     for turn in range(iterations):
         swept = follower.sweep(found[-1])
         if not np.abs(swept.slopes).max() < BLOWN_UP:

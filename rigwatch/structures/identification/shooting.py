@@ -66,7 +66,7 @@ def solve(
     with np.errstate(all="ignore"):
         outcome, step = _solved(problem, iterations, scale)
     if not partial:
-        name = problem.sweeper.compiled.system.model.name
+        name = problem.system.model.name
         require_determined(problem.names, step.blind, name)
     return replace(outcome, undetermined=_uncertain(problem, outcome.iterations[-1], step))
 
@@ -153,7 +153,7 @@ def _over_windows(problem: Problem, grown: _Grown, iterations: int) -> tuple[Out
     """The final fit over the longest accepted windows."""
     if len(problem.loose) or grown.windows is None:
         raise ModelError(
-            f"{problem.sweeper.compiled.system.model.name}: found trajectories that part from the"
+            f"{problem.system.model.name}: found trajectories that part from the"
             " record, which do not determine initial states; expected known ones"
         )
     near = grown.windows.refined(grown.parameters, iterations, FINEST)

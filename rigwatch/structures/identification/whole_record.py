@@ -47,7 +47,7 @@ class WholeRecord:
         errors, slopes = self._errors(now)
         if not np.isfinite(slopes).all():
             raise ModelError(
-                f"{self.problem.sweeper.compiled.system.model.name}: the simulation over the whole"
+                f"{self.problem.system.model.name}: the simulation over the whole"
                 " record diverges (NaN or infinite); try other guesses"
             )
         for turn in range(iterations):
@@ -81,22 +81,15 @@ class WholeRecord:
         self, now: FloatArray, change: FloatArray, errors: FloatArray, scale: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
         """The step, halved until the error falls; None if no step lowers it."""
-        cost = self._cost(errors, scale)
+        cost, count = self._cost(errors, scale), len(self.problem.free)
         for _ in range(HALVINGS):
-            moved = self._inside(now + change)
+            moved = now + change
+            moved[:count] = self.problem.bounded(moved[:count])
             new_errors, slopes = self._errors(moved)
             if np.isfinite(slopes).all() and self._cost(new_errors, scale) <= cost:
                 return moved, new_errors, slopes
             change = change / 2
         return None
-
-    def _inside(self, unknowns: FloatArray) -> FloatArray:
-        system = self.problem.sweeper.compiled.system
-        free = [system.parameters[name] for name in system.free]
-        unknowns[: len(free)] = np.clip(
-            unknowns[: len(free)], [p.low for p in free], [p.high for p in free]
-        )
-        return unknowns
 
     def _errors(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
         outputs, slopes = self.problem.simulate(unknowns, FINER * self.problem.substeps)

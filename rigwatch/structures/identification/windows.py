@@ -155,7 +155,7 @@ class Windows:
         """
         errors, slopes = self._run(parameters, self._initial)
         if not np.isfinite(slopes).all():
-            name = self.problem.sweeper.compiled.system.model.name
+            name = self.problem.system.model.name
             raise ModelError(
                 f"{name}: found no trajectories that follow the record, expected other guesses or"
                 " more signals"
@@ -184,9 +184,6 @@ class Windows:
         return None
 
     def _inside(self, now: FloatArray, change: FloatArray) -> FloatArray:
-        system, moved = self.problem.sweeper.compiled.system, now.copy()
-        free = [system.parameters[name] for name in system.free]
-        moved[self.problem.free] = np.clip(
-            now[self.problem.free] + change, [p.low for p in free], [p.high for p in free]
-        )
+        moved, free = now.copy(), self.problem.free
+        moved[free] = self.problem.bounded(now[free] + change)
         return moved

@@ -1,6 +1,6 @@
 """Online damage detection: sample blocks in; residuals, an alarm and the damage's place out.
 
-    learning ──undamaged seconds──▶ watching ──alarm──▶ gathering ──settle──▶ told
+    learning ──undamaged seconds──▶ watching ──alarm──▶ gathering ──settle──▶ reported
 
 The undamaged structure is identified from the first seconds, then its model runs beside the samples
 (4.34) and the residual is judged as `damage.examine` judges a record. Some seconds after an alarm
@@ -113,7 +113,7 @@ class LiveDamage:
         self._boot, self._first, self._device = block.boot, block.seq, block.device
         self._record = GrowingRecord(self._dt, self._structure.signals, self._loads)
         self._moving = self._settings.moving or block.seq > 0
-        self._stage: Literal["learning", "watching", "gathering", "told"] = "learning"
+        self._stage: Literal["learning", "watching", "gathering", "reported"] = "learning"
         self._done = 0
 
     def _messages(self) -> list[Said]:
@@ -141,7 +141,7 @@ class LiveDamage:
                 moving=self._moving,
             )
         except ModelError as error:
-            self._stage = "told"
+            self._stage = "reported"
             return [self._event(row, "error", "NOT WATCHED", str(error))]
         self._beside = _UndamagedRun(base, settings, self._dt)
         self._stage = "watching"
@@ -156,7 +156,7 @@ class LiveDamage:
             self._stage, self._alarm = "gathering", row
             return [self._raised(row)]
         if self._stage == "gathering" and (row - self._alarm) * self._dt >= self._settings.settle:
-            self._stage = "told"
+            self._stage = "reported"
             return [self._event(row, "critical", "DAMAGE", self._place(row))]
         return []
 
@@ -204,7 +204,7 @@ class _UndamagedRun:
 
     def __init__(self, base: Reference, settings: LiveSettings, dt: float) -> None:
         self.model = base.model
-        system = base.model.problem.sweeper.compiled.system
+        system = base.model.problem.system
         self.units = [system.model.outputs[name].unit for name in base.model.signals]
         self._parameters = base.parameters
         self._state = base.model.start()
@@ -251,7 +251,7 @@ def _check(settings: LiveSettings) -> None:
 
 
 def _learnt(base: Reference) -> str:
-    parameters = base.model.problem.sweeper.compiled.system.parameters
+    parameters = base.model.problem.system.parameters
     units = {name: parameters[name].unit for name in base.figures if name in parameters}
     found = ", ".join(
         f"{name} = {figure.value:.6g} {units.get(name, '')}".rstrip()

@@ -7,16 +7,7 @@ from rigwatch.wire.bus import Bus, joined
 from rigwatch.wire.delivery import SampleReader
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.host import set_at_signal
-from rigwatch.wire.messages import (
-    ALARMS,
-    ESTIMATES,
-    EVENTS,
-    HEALTH,
-    Alarm,
-    EstimateBlock,
-    Health,
-    SampleBlock,
-)
+from rigwatch.wire.messages import HEALTH, Health, SampleBlock, topic_of
 from rigwatch.wire.rig_config import RigConfig
 
 TURN = 0.1
@@ -61,10 +52,7 @@ class StructureProcess:
             return
         self._unsuitable = ""
         for message in said:
-            if isinstance(message, EstimateBlock):
-                self._bus.publish(ESTIMATES, message)
-            else:
-                self._bus.publish(ALARMS if isinstance(message, Alarm) else EVENTS, message)
+            self._bus.publish(topic_of(message), message)
 
     def _health(self) -> Health:
         counters = {"delivered": float(self.reader.counters.delivered)}

@@ -68,7 +68,7 @@ def report_html(findings: Findings) -> str:
         "rigwatch.structures.report",
         "identification.html",
         f=findings,
-        name=findings.problem.sweeper.compiled.system.model.name,
+        name=findings.problem.system.model.name,
         headline=_headline(findings),
         left={method: _left(findings, method) for method in findings.found},
         iterations=_iterations(findings),
@@ -134,7 +134,7 @@ def _changes(problem: Problem, one: Identification) -> FloatArray:
 
 def _signals(f: Findings) -> Iterator[tuple[str, str, str]]:
     """Name of each measured output, its plot, and the plot of its residual."""
-    seconds, outputs = seconds_of(f.problem), f.problem.sweeper.compiled.system.model.outputs
+    seconds, outputs = seconds_of(f.problem), f.problem.system.model.outputs
     for k, (name, output) in enumerate(outputs.items()):
         measured = f.problem.observed[:, k]
         if np.isfinite(measured).any():

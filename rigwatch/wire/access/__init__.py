@@ -34,7 +34,7 @@ from rigwatch.wire.access.register import (
 )
 from rigwatch.wire.access.signing import Signer
 from rigwatch.wire.access.statement import names_a_person
-from rigwatch.wire.access.validity import days_left, ending_soon, in_force, told
+from rigwatch.wire.access.validity import days_left, ending_soon, endings_text, in_force
 from rigwatch.wire.access.verifying import Verifier
 
 __all__ = [
@@ -52,6 +52,7 @@ __all__ = [
     "check_exposure",
     "days_left",
     "ending_soon",
+    "endings_text",
     "in_force",
     "key_files",
     "names_a_person",
@@ -59,6 +60,5 @@ __all__ = [
     "read_register",
     "signer_of",
     "tls_settings",
-    "told",
     "verifier_of",
 ]

@@ -19,7 +19,7 @@ NAME = "commands.secret"
 LENGTH = 64
 """Characters of a secret: 256 bits, hexadecimal."""
 _FOR_OTHERS = 0o027
-"""Permissions that nobody may have: others none, the group at most reading."""
+"""Permissions that must not be set: the group may only read, others have none."""
 
 
 def secret_file(security: SecuritySection) -> Path:

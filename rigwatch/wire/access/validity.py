@@ -27,7 +27,7 @@ def ending_soon(register: Register, today: date) -> list[Issued]:
     return sorted(found, key=lambda one: days_left(one, today))
 
 
-def told(endings: list[Issued]) -> str:
+def endings_text(endings: list[Issued]) -> str:
     """A sentence on certificates that end soon."""
     dates = ", ".join(f"{one.name} {one.ends}" for one in endings)
     return f"certificates end: {dates}; issue them anew with `rigwatch keys issue` and restart"

@@ -4,6 +4,7 @@ import csv
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -85,11 +86,6 @@ def _tables(found: Iterator[Any], path: Path) -> Tables:
         yield table
 
 
-def _all(first: dict[str, Array], rest: Tables) -> Tables:
-    yield first
-    yield from rest
-
-
 def _length(table: dict[str, Array]) -> int:
     return len(next(iter(table.values())))
 
@@ -99,7 +95,7 @@ def _write_csv(target: Path, first: dict[str, Array], rest: Tables) -> int:
     with target.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(first)
-        for table in _all(first, rest):
+        for table in chain([first], rest):
             # Python prints a float with enough digits to restore it exactly.
             writer.writerows(zip(*(column.tolist() for column in table.values()), strict=True))
             rows += _length(table)
@@ -114,7 +110,7 @@ def _write_parquet(target: Path, first: dict[str, Array], rest: Tables) -> int:
         raise MissingExtraError("pyarrow", "parquet", "writing Parquet files") from None
     rows = 0
     with parquet.ParquetWriter(target, pyarrow.table(first).schema) as writer:
-        for table in _all(first, rest):
+        for table in chain([first], rest):
             writer.write_table(pyarrow.table(table))
             rows += _length(table)
     return rows
@@ -124,7 +120,7 @@ def _write_mat(target: Path, first: dict[str, Array], rest: Tables) -> int:
     """One variable a column, and `column_titles`: "variable=title" of each, with its unit."""
     from scipy.io import savemat  # slow to import
 
-    tables = list(_all(first, rest))
+    tables = list(chain([first], rest))
     whole = {name: np.concatenate([table[name] for table in tables]) for name in first}
     if max(column.nbytes for column in whole.values()) >= LARGEST_MAT:
         raise SessionError(f"{target}: too long for a MAT file, trim it or export Parquet")

@@ -88,10 +88,6 @@ def _titles(found: Value | None, arrays: dict[str, Any]) -> dict[str, str]:
     return {name: title for name, _, title in pairs if name in arrays}
 
 
-def _read_json(path: Path, _: ImportMapping) -> Table:
-    return read_json(path)
-
-
 def _read_parquet(path: Path, _: ImportMapping) -> Table:
     try:
         from pyarrow import parquet
@@ -115,5 +111,5 @@ _READERS: dict[str, Callable[[Path, ImportMapping], Table]] = {
     "csv": read_csv,
     "mat": _read_mat,
     "parquet": _read_parquet,
-    "json": _read_json,
+    "json": lambda path, _: read_json(path),
 }

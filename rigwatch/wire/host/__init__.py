@@ -6,6 +6,7 @@ from rigwatch.wire.host.ending import set_at_hangup, set_at_signal
 from rigwatch.wire.host.few_pools import use_few_pools
 from rigwatch.wire.host.heartbeat import Heartbeat
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
+from rigwatch.wire.host.processes import end_process, end_with_parent, last_line
 from rigwatch.wire.host.realtime import DAQ, MONITOR, ROUTER, prepare_for_real_time, raise_priority
 from rigwatch.wire.host.side_by_side import Part, Pulse, RigPulse, Work, run_side_by_side
 from rigwatch.wire.host.whole_file import replace_file, write_through
@@ -20,11 +21,14 @@ __all__ = [
     "RigPulse",
     "Work",
     "both_clocks",
+    "end_process",
+    "end_with_parent",
     "endpoint_address",
     "free_port",
     "free_ports",
     "free_share",
     "is_free",
+    "last_line",
     "prepare_for_real_time",
     "raise_priority",
     "replace_file",

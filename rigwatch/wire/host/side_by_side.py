@@ -3,9 +3,9 @@
     rig a ──advance──▶ Part ─┐
     rig b ──advance──▶ Part ─┴─ sum ─▶ heartbeat of the process
 
-A rig whose work fails is left alone for a while and starts anew, as its process would. A loop that
-stands still, in a device that never answers, is reported; the others go on. When it
-is asked to renew, rigs whose configuration has changed start anew, and only those.
+A rig whose work fails is restarted after a while, as its process would be. A loop that hangs, in a
+device that never answers, is reported; the others continue. A renewal restarts the rigs whose
+configuration has changed, and only those.
 """
 
 import logging
@@ -18,7 +18,7 @@ from rigwatch.wire.errors import line_about
 from rigwatch.wire.host.heartbeat import Heartbeat
 
 BEAT = 0.2
-"""Time between two looks at the rigs [s]."""
+"""Time between two checks of the rigs [s]."""
 HANGS_AFTER = 5.0
 """Time without a turn of a rig's loop after which that is reported [s]."""
 FIRST_PAUSE, LONGEST_PAUSE = 1.0, 30.0
@@ -111,8 +111,8 @@ class Part:
         """See `RigPulse`."""
         self._out(f"{self._name}: {text}")
 
-    def look(self) -> None:
-        """Report a loop that stands still, and one that goes on."""
+    def check(self) -> None:
+        """Report a loop that hangs, and one that runs again."""
         at = self._turned_at
         hangs = at is not None and time.monotonic() - at > HANGS_AFTER
         if hangs != self._hangs:
@@ -124,7 +124,7 @@ class Part:
         """Start the work anew if what it depends on has changed, and is right."""
         try:
             changed = self._version() != self._taken
-        except Exception as error:  # the rig goes on as it is
+        except Exception as error:  # the rig keeps running with what it has
             self._out(f"{line_about(self._name, error)}; goes on as before")
             return
         if changed:
@@ -144,7 +144,7 @@ class Part:
             try:
                 self._taken = self._version()
                 self._work(self._stop, self)
-            except Exception as error:  # whatever is wrong with one rig, the others go on
+            except Exception as error:  # whatever is wrong with one rig, the others continue
                 self._failed(error)
             self._before, self._now, self._turned_at = self.count, 0, None
             if not self._ended:
@@ -178,7 +178,7 @@ def run_side_by_side(
             for part in parts:
                 part.renew()
         for part in parts:
-            part.look()
+            part.check()
         waits = "no rig has samples to come" if all(part.waits for part in parts) else ""
         heartbeat.advance(sum(part.count for part in parts), waits)
     heartbeat.stopping()

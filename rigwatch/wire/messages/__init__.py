@@ -71,6 +71,7 @@ from rigwatch.wire.messages.topics import (
     Topic,
     bus_key,
     topic,
+    topic_of,
 )
 
 __all__ = [
@@ -134,6 +135,7 @@ __all__ = [
     "protobuf_schema",
     "quality_flags",
     "topic",
+    "topic_of",
     "unseen",
     "valid",
 ]

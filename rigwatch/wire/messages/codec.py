@@ -5,8 +5,8 @@ from typing import Any, TypeVar, cast
 
 from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import protobuf
+from rigwatch.wire.messages.block_decoding import decode_joined, decode_own
 from rigwatch.wire.messages.blocks import Block
-from rigwatch.wire.messages.gathered import decode_joined, decode_own
 from rigwatch.wire.messages.message_types import EstimateBlock, Message, SampleBlock
 from rigwatch.wire.messages.packed_encoding import encode_block
 

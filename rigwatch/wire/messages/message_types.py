@@ -27,7 +27,7 @@ AlarmState = Literal["normal", "unacknowledged", "acknowledged", "cleared_unackn
 """States of ISA-18.2: active and not yet seen, active and seen, gone before it was seen."""
 AlarmAction = Literal["acknowledge", "reset", "shelve", "unshelve"]
 Identity = Literal["", "proved", "not proved"]
-"""Whether the user of a command is who it says; "" where nobody acted."""
+"""Whether the user of a command is proved; "" without a user."""
 PROVED: Identity = "proved"
 NOT_PROVED: Identity = "not proved"
 

@@ -1,4 +1,4 @@
-"""Keeps what was used of late, in bounded memory."""
+"""A mapping that keeps the most recently used items, in bounded memory."""
 
 from typing import Generic, TypeVar
 

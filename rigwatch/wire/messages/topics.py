@@ -77,6 +77,7 @@ TOPICS: tuple[Topic, ...] = (
     RUN,
     MODELS,
 )
+_BY_CLASS = {line.message: line for line in TOPICS}
 
 RECORDERS = (RUN.publisher, "headquarters")
 """The recorder of a rig at its own site, and one at another."""
@@ -86,6 +87,11 @@ PAST_KEY = "recorder/past"
 """Key at which a recorder answers for its sessions."""
 ALIVE_KEY = "alive"
 """Liveliness tokens are at `alive/<process>`."""
+
+
+def topic_of(message: Message) -> Topic:
+    """The topic that carries messages of this class."""
+    return _BY_CLASS[type(message)]
 
 
 def topic(name: str) -> Topic:

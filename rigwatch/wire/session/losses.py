@@ -50,7 +50,7 @@ class Losses:
         self._open: set[int] = set()
 
     def add(self, message: SampleBlock | Gap) -> None:
-        """Take notice of samples, or of a report."""
+        """Record samples, or a report of losses."""
         if isinstance(message, SampleBlock):
             if len(message):
                 span = message.seq, message.seq + len(message) - 1

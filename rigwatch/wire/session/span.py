@@ -1,7 +1,7 @@
 """A span of time of several segments, read page by page without what lies before it.
 
 Chunks carry the times of their messages, so those of other times are skipped without being
-unpacked. A page ends at a `Place`, from which the next one goes on.
+unpacked. A page ends at a `Place`, from which the next one continues.
 """
 
 import struct

@@ -139,7 +139,7 @@ class SessionWriter:
             self.abandon()
 
     def abandon(self) -> None:
-        """Close the file as it is on the disk, without an index."""
+        """Close the file without an index; what was flushed stays on the disk."""
         self._output.close()
 
     def __enter__(self) -> Self:

@@ -1,6 +1,7 @@
-"""JSON from outside as a typed value: whatever is wrong with it, one kind of error."""
+"""JSON from outside as a typed value, with one kind of error, and values as JSON."""
 
-from typing import TypeVar
+from pathlib import Path
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -30,3 +31,24 @@ def decoded(data: bytes | str, decoder: "msgspec.json.Decoder[T]") -> T:
         return decoder.decode(data)
     except (msgspec.DecodeError, ValueError, RecursionError) as error:
         raise JsonError(str(error)) from None
+
+
+def as_json(value: Any, *, sort_keys: bool = False) -> bytes:
+    """Plain data, dataclasses, paths and arrays as JSON; a number that is not finite is null.
+
+    Args:
+        value: what is written.
+        sort_keys: whether equal values give equal bytes, whatever the order of their keys.
+
+    Raises:
+        NotImplementedError: a part of it has no JSON form.
+    """
+    return msgspec.json.encode(value, enc_hook=_plain, order="deterministic" if sort_keys else None)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Path):
+        return str(value)
+    if hasattr(value, "tolist"):  # an array or a number of NumPy
+        return value.tolist()
+    raise NotImplementedError(f"{type(value).__name__} has no JSON form")

@@ -1,5 +1,6 @@
 """Units: one table of quantities with exact factors, and parsing of texts such as "kN/mm"."""
 
+from rigwatch.wire.units.spellings import in_table_words, may_count_turns
 from rigwatch.wire.units.unit import (
     GRAM,
     NONE,
@@ -11,7 +12,6 @@ from rigwatch.wire.units.unit import (
     unit_of,
 )
 from rigwatch.wire.units.unit_table import Dimension
-from rigwatch.wire.units.written import in_table_words, may_count_turns
 
 __all__ = [
     "GRAM",

@@ -13,7 +13,7 @@ WHOLE = {
     "u/min": "rpm", "upm": "rpm", "r/min": "rpm", "r.p.m.": "rpm", "tr/min": "rpm", "-": "1",
     "lb-ft": "ft lbf", "ft-lb": "ft lbf", "lb-in": "inch lbf", "in-lb": "inch lbf",
 }  # fmt: skip
-"""What stands for a unit as a whole, in lower case."""
+"""Spellings of whole units, in lower case."""
 _WORD = re.compile(r"[A-Za-zµ°]+")
 _NEGATIVE = re.compile(r"(?<=[A-Za-z])[-−](?=\d)")
 _PRODUCT = re.compile(r"(?<=[A-Za-z])-(?=[A-Za-z])")
@@ -24,7 +24,7 @@ _TIME = BASES.index("s")
 
 
 def in_table_words(text: str) -> str:
-    """The unit in the table's words; what is no unit stays as it is."""
+    """The unit in the table's words; a text that is no unit is returned unchanged."""
     written = text.strip()
     if written in ENTRIES:
         return written

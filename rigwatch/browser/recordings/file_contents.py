@@ -16,7 +16,7 @@ SHOWN = 5
 
 
 @dataclass(frozen=True)
-class Look:
+class FileContents:
     """Content of a file.
 
     Attributes:
@@ -34,7 +34,7 @@ class Look:
     rows: int
 
 
-def look_at(path: Path) -> Look:
+def contents_of(path: Path) -> FileContents:
     """Inspect a CSV, MAT, Parquet or JSON file.
 
     Raises:
@@ -44,7 +44,7 @@ def look_at(path: Path) -> Look:
     name, mapping = _fitting(path, list(cells))
     columns = [_column(name, values) for name, values in cells.items()]
     rows = max((len(values) for values in cells.values()), default=0)
-    return Look(columns, scalars, name, msgspec.to_builtins(mapping), rows)
+    return FileContents(columns, scalars, name, msgspec.to_builtins(mapping), rows)
 
 
 def _column(name: str, values: Any) -> dict[str, Any]:

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from rigwatch.dashboard.board.alarm_book import AlarmBook
 from rigwatch.dashboard.board.facts import SILENCE, Facts
+from rigwatch.dashboard.board.log_lines import alarm_level, alarm_line, gap_line
 from rigwatch.dashboard.board.palette import VERDICTS
 from rigwatch.dashboard.board.status import advice, status
-from rigwatch.dashboard.board.words import alarm_level, alarm_line, gap_line
 from rigwatch.wire.messages.message_types import (
     PROBABLY_MISSING,
     Alarm,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from rigwatch.commands.common.session_files import say
+from rigwatch.commands.common.output import say
 
 if TYPE_CHECKING:
     from rigwatch.batch import Job, Outcome
@@ -27,7 +27,7 @@ def add_many(parser: argparse.ArgumentParser, name: str, help_: str) -> None:
 
 
 def _place(text: str) -> Path | str:
-    """A path, or an address such as s3://bucket/rigs, which must stay as it is."""
+    """A path, or an address such as s3://bucket/rigs, which no `Path` may rewrite."""
     return text if "://" in text else Path(text)
 
 
