@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from rigwatch.commands import main
-from rigwatch.commands.common.watched import messages_of
+from rigwatch.commands.sessions.session_messages import messages_of
 from rigwatch.dashboard.board import palette
 from rigwatch.wire.messages import Alarm
 from rigwatch.wire.session import SessionWriter, open_session, run_info
