@@ -74,9 +74,9 @@ def test_healthy_fit_comes_near_to_what_repeated_periods_allow() -> None:
 @pytest.mark.parametrize(
     ("case", "named", "parameter", "truth"),
     [
-        ("spring", "linear_stiffness@load", "k", None),
+        pytest.param("spring", "linear_stiffness@load", "k", None, marks=pytest.mark.nightly),
         ("deadband", "dead_band@drive", "b", 0.03),
-        ("saturation", "saturation@drive", "us", 0.5),
+        pytest.param("saturation", "saturation@drive", "us", 0.5, marks=pytest.mark.nightly),
         ("coulomb_strong", "coulomb@load", "Fc", None),
     ],
 )
