@@ -16,16 +16,18 @@ from starlette.staticfiles import StaticFiles
 
 from rigwatch.browser.server.access import Access, Guard
 from rigwatch.browser.server.application import STATIC, style
-from rigwatch.browser.server.event_streams import STILL_HERE, event, event_stream
+from rigwatch.browser.server.event_streams import (
+    STILL_EVERY,
+    STILL_HERE,
+    event,
+    event_stream,
+    stalled,
+)
 from rigwatch.fleet import Dashboards, RigState, as_live_page, as_part, summary
 from rigwatch.wire.errors import RigwatchError
 
 BETWEEN = 2.0
 """Time between two looks at the rigs [s]."""
-STILL_EVERY = 5.0
-"""Time after which a page without news is told that the server is there [s]."""
-OLD_AFTER = 10.0
-"""Time without a look that ends, after which the pages are told that their figures are old [s]."""
 Look = Callable[[], list[RigState]]
 
 
@@ -47,14 +49,14 @@ class FleetPages:
         self._look = look
         self.dashboards = Dashboards()
         self._news = asyncio.Condition()
-        self._seen_at = time.monotonic()
+        self._looked_at = time.monotonic()
 
     async def follow(self) -> None:
         """Look again and again, and tell the open pages."""
         while True:
             states = await asyncio.to_thread(self._look)
             async with self._news:
-                self.states, self._seen_at = states, time.monotonic()
+                self.states, self._looked_at = states, time.monotonic()
                 self._news.notify_all()
             await asyncio.sleep(BETWEEN)
 
@@ -62,9 +64,9 @@ class FleetPages:
         """The rigs now, and whenever something has changed; how old they are if looks stall."""
         told = b""
         while True:
-            if (silent := time.monotonic() - self._seen_at) > OLD_AFTER:
+            if old := stalled(self._looked_at):
                 told = b""  # the next look is told whatever it shows
-                yield event("old", msgspec.json.encode({"seconds": round(silent)}))
+                yield old
             else:
                 content = msgspec.json.encode(
                     {"summary": summary(self.states), "html": as_part(self.states)}

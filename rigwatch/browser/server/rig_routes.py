@@ -22,7 +22,7 @@ from rigwatch.browser.rig import (
     study_of_alarm,
 )
 from rigwatch.browser.server.context import answer, body_of, context_of, told
-from rigwatch.browser.server.event_streams import STILL_HERE, event, event_stream
+from rigwatch.browser.server.event_streams import STILL_HERE, event, event_stream, stalled
 from rigwatch.browser.server.places import PlaceError
 from rigwatch.browser.views import listed, render
 from rigwatch.browser.work import as_plain
@@ -81,6 +81,11 @@ async def rig_events(request: Request) -> Response:
 async def _events(link: RigLink) -> AsyncGenerator[bytes, None]:
     since, told = 0, b""
     while True:
+        if old := stalled(link.looked_at):
+            told = b""  # the next look is told whatever it shows
+            yield old
+            await asyncio.sleep(EVERY)
+            continue
         status = msgspec.json.encode(as_plain(link.status()))
         if status != told:
             told = status
