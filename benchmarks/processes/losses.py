@@ -131,7 +131,7 @@ def read_recording(rig: LiveRig) -> Spans:
     from rigwatch.wire.session.reader import open_session
 
     spans: Spans = {}
-    for folder in sorted((rig.folder / "sessions").iterdir()):
+    for folder in sorted((rig.folder / "sessions").glob("*Z*")):
         for recorded in open_session(folder).messages(["samples", "gaps"]):
             item = recorded.message
             if isinstance(item, SampleBlock):

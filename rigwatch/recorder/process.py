@@ -19,7 +19,7 @@ from rigwatch.recorder.remote_feed import RemoteFeed
 from rigwatch.recorder.retention import Retention
 from rigwatch.recorder.store import Store
 from rigwatch.wire.bus import Bus, joined
-from rigwatch.wire.host import Heartbeat, Pulse, free_share, use_few_pools
+from rigwatch.wire.host import Heartbeat, Pulse, free_share, hold, use_few_pools
 from rigwatch.wire.messages import (
     ALARMS,
     ESTIMATES,
@@ -131,7 +131,20 @@ class Recorder:
 
 
 def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event, pulse: Pulse) -> Path:
-    """Record until `stop` is set, telling `pulse` of each turn; returns the session's folder."""
+    """Record until `stop` is set, telling `pulse` of each turn; returns the session's folder.
+
+    Raises:
+        SessionError: another process records this rig into the same folder.
+    """
+    root = Path((config.recorder or RecorderSection()).folder)
+    give_up = hold(root / f".{config.rig.id}.lock", f"{root}: recording of {config.rig.id}")
+    try:
+        return _record(config, run, bus, stop, pulse)
+    finally:
+        give_up()
+
+
+def _record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event, pulse: Pulse) -> Path:
     recorder = Recorder(config, run, bus)
     pulse.ready(f"recording to {recorder.store.folder}")
     while not stop.wait(recorder.settings.flush * _OF_FLUSH):
@@ -167,6 +180,7 @@ def run(path: Path | str, stop: threading.Event, notes: str = "") -> Path | None
     Raises:
         ConfigError: the configuration is invalid.
         BusError: the router's endpoint is invalid.
+        SessionError: see `record`.
     """
     use_few_pools()
     config = load_rig(path)

@@ -1,10 +1,11 @@
-"""The host: notifications, priority, threads of rigs, ports, signals, files, memory, clocks."""
+"""The host: notifications, priority, threads of rigs, ports, signals, files, locks, clocks."""
 
 from rigwatch.wire.host.both_clocks import both_clocks
 from rigwatch.wire.host.disk_space import free_share
 from rigwatch.wire.host.ending import set_at_hangup, set_at_signal
 from rigwatch.wire.host.few_pools import use_few_pools
 from rigwatch.wire.host.heartbeat import Heartbeat
+from rigwatch.wire.host.holding import hold
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
 from rigwatch.wire.host.realtime import DAQ, MONITOR, ROUTER, prepare_for_real_time, raise_priority
 from rigwatch.wire.host.side_by_side import Part, Pulse, RigPulse, Work, run_side_by_side
@@ -24,6 +25,7 @@ __all__ = [
     "free_port",
     "free_ports",
     "free_share",
+    "hold",
     "is_free",
     "prepare_for_real_time",
     "raise_priority",
