@@ -5,9 +5,14 @@
 A recorder that was killed and restarted continues in the same folder, or after a long interruption
 in a new one, and queries the rings for what it missed. What they no longer have is a gap. After one
 that was stopped on purpose, a new session begins with the samples from then on.
+
+`<recorder.folder>/.<rig>.last` names the session that was recorded last: by the times of files, one
+of a day on which the clock was years ahead would be the newest until that year.
 """
 
+import contextlib
 import re
+import time
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -16,6 +21,7 @@ from pathlib import Path
 
 from rigwatch.recorder.positions import Positions, load_positions
 from rigwatch.wire.errors import SessionError
+from rigwatch.wire.host import replace_file
 from rigwatch.wire.messages import SAMPLES, Block, RunInfo, Topic
 from rigwatch.wire.session import SUFFIX, Session, open_session
 
@@ -47,13 +53,27 @@ def sessions_of(root: Path, rig: str) -> Iterator[Path]:
             yield path
 
 
+def note_last(folder: Path, rig: str) -> None:
+    """Note that `folder` is the session that is recorded now."""
+    place = _last(folder.parent, rig)
+    try:
+        replace_file(place, folder.name, durable=False)
+    except OSError:
+        with contextlib.suppress(OSError):
+            place.unlink()  # rather none than a wrong one
+
+
+def _last(root: Path, rig: str) -> Path:
+    return root / f".{rig}.last"
+
+
 def newest(root: Path, rig: str) -> Path:
     """The newest of a rig's sessions, one that is still written included.
 
     Raises:
         SessionError: there is none.
     """
-    found = _newest_first(root, rig)
+    found = _newest_first(root, rig, time.time_ns())
     if not found:
         raise SessionError(f"{root}: found no recording of {rig}, expected one of its recorder")
     return found[0]
@@ -126,7 +146,7 @@ def _interrupted(root: Path, run: RunInfo) -> _Interrupted | None:
 
 def _sessions(root: Path, run: RunInfo) -> Iterator[_Interrupted]:
     """Sessions of this rig, the newest first, back to another configuration."""
-    for folder in _newest_first(root, run.rig):
+    for folder in _newest_first(root, run.rig, run.t_ns):
         try:
             session = open_session(folder)
             if session.info.configuration_sha256 != run.configuration_sha256:
@@ -136,12 +156,26 @@ def _sessions(root: Path, run: RunInfo) -> Iterator[_Interrupted]:
             continue  # killed before its first message
 
 
-def _newest_first(root: Path, rig: str) -> list[Path]:
+def _newest_first(root: Path, rig: str, now_ns: int) -> list[Path]:
+    """Sessions with files by the time of the last one; those ahead of the clock come last.
+
+    The one that was recorded last is where its time says: the clock may have been set back since.
+    """
+    last = ""
+    with contextlib.suppress(OSError, ValueError):
+        last = _last(root, rig).read_text(encoding="utf-8")
     try:
         folders = [path for path in sessions_of(root, rig) if any(path.glob(f"*{SUFFIX}"))]
-        return sorted(folders, key=_written_ns, reverse=True)
+        written = {path: _written_ns(path) for path in folders}
     except OSError:
         return []
+    known = any(path.name == last for path in folders)
+
+    def place(path: Path) -> tuple[bool, int]:
+        ahead = known and path.name != last and written[path] > now_ns
+        return not ahead, written[path]
+
+    return sorted(folders, key=place, reverse=True)
 
 
 def _written_ns(folder: Path) -> int:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rigwatch.recorder.disk import DiskWatch
 from rigwatch.recorder.feed import Feed
-from rigwatch.recorder.folders import LONGEST_BREAK, choose
+from rigwatch.recorder.folders import LONGEST_BREAK, choose, note_last
 from rigwatch.recorder.past import PastServer
 from rigwatch.recorder.positions import PositionFile, Positions
 from rigwatch.recorder.remote_feed import RemoteFeed
@@ -58,7 +58,7 @@ class Recorder:
         self.store = Store(place.folder, run, self.settings.segment)
         self.feed = RemoteFeed(bus, place) if remote else Feed(bus, place.last, place.positions)
         self._bus = bus
-        self._settled = 0
+        self._settled = self._noted = 0
         self._disk = DiskWatch()
         self._retention = Retention(self.settings, config.rig.id)
         self._told_at = -HEALTH_EVERY
@@ -90,11 +90,18 @@ class Recorder:
     def _flush(self, now: float, t_ns: int) -> None:
         taken = self.feed.positions()
         self._tell(self.store.flush(now, t_ns))
+        self._note_segment()
         if not self.store.failure:
             self._settled = t_ns - UNSETTLED_NS
         if not self.store.failure and taken != self._kept:
             self._kept = taken
             self._positions.save(taken)
+
+    def _note_segment(self) -> None:
+        """Note the session with each segment: somebody may have removed the note."""
+        if self.store.segment_count != self._noted and not self.store.failure:
+            self._noted = self.store.segment_count
+            note_last(self.store.folder, self._bus.rig)
 
     def _tell(self, events: list[Event]) -> None:
         for event in events:

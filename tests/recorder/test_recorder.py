@@ -125,6 +125,8 @@ def test_everything_said_is_kept_once(config: Path) -> None:
     monitor.publish(ALARMS, alarm(1))
     recorder.turn(0.0, time.time_ns())
     recorder.close(1.0, time.time_ns())
+    last = recorder.store.folder.with_name(".bench1.last")
+    assert last.read_text() == recorder.store.folder.name
     session = open_session(recorder.store.folder)
     counts: dict[str, int] = {}
     for item in session.messages():
