@@ -18,6 +18,7 @@ from rigwatch.wire.bus.commands import (
     ask_for_model,
     command_alarms,
     command_mark,
+    marked,
     proved_here,
     serve_alarm_list,
 )
@@ -62,6 +63,7 @@ __all__ = [
     "connect",
     "joined",
     "log_refusals",
+    "marked",
     "open_router",
     "proved_here",
     "serve_alarm_list",
