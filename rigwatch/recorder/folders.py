@@ -4,13 +4,15 @@
 
 A recorder that was killed and restarted continues in the same folder, or after a long interruption
 in a new one, and queries the rings for what it missed. What they no longer have is a gap. After one
-that was stopped on purpose, a new session begins with the samples from then on.
+that was stopped on purpose, a new session begins with the samples from then on, unless the stop was
+short: a recorder that is started anew with a changed configuration misses nothing.
 
 `<recorder.folder>/.<rig>.last` names the session that was recorded last: by the times of files, one
 of a day on which the clock was years ahead would be the newest until that year.
 """
 
 import contextlib
+import math
 import re
 import time
 from collections import deque
@@ -39,11 +41,13 @@ class Place:
     Attributes:
         last: (boot, seq) of the last sample recorded, None to begin with the next one.
         positions: the same for numbered messages.
+        changed: they are those of a recording with another configuration.
     """
 
     folder: Path
     last: tuple[int, int] | None = None
     positions: Positions = field(default_factory=dict)
+    changed: bool = False
 
 
 def sessions_of(root: Path, rig: str) -> Iterator[Path]:
@@ -92,6 +96,8 @@ def choose(root: Path, run: RunInfo, longest_break: float = LONGEST_BREAK) -> Pl
         return before.place
     stamp = datetime.fromtimestamp(run.t_ns // 1_000_000_000, UTC).strftime("%Y%m%dT%H%M%SZ")
     folder = _unused(root / f"{run.rig}-{stamp}")
+    if before is None and math.isfinite(longest_break):
+        return _just_ended(folder, root, run)
     if before is None or before.stopped:
         return Place(folder)
     return Place(folder, before.place.last, before.place.positions)
@@ -144,14 +150,28 @@ def _interrupted(root: Path, run: RunInfo) -> _Interrupted | None:
     return newest
 
 
+def _just_ended(folder: Path, root: Path, run: RunInfo) -> Place:
+    """A new session, after one of another configuration if that has just ended."""
+    _, before = next(_ends(root, run), ("", None))
+    if before is None or abs(run.t_ns - before.ended_ns) > LONGEST_BREAK * 1e9:
+        return Place(folder)
+    return Place(folder, before.place.last, before.place.positions, changed=True)
+
+
 def _sessions(root: Path, run: RunInfo) -> Iterator[_Interrupted]:
     """Sessions of this rig, the newest first, back to another configuration."""
+    for configuration, one in _ends(root, run):
+        if configuration != run.configuration_sha256:
+            return
+        yield one
+
+
+def _ends(root: Path, run: RunInfo) -> Iterator[tuple[str, _Interrupted]]:
+    """The hash of the configuration and the end of each session of this rig, the newest first."""
     for folder in _newest_first(root, run.rig, run.t_ns):
         try:
             session = open_session(folder)
-            if session.info.configuration_sha256 != run.configuration_sha256:
-                return
-            yield _end_of(session)
+            yield session.info.configuration_sha256, _end_of(session)
         except (OSError, SessionError, ValueError):
             continue  # killed before its first message
 

@@ -16,6 +16,7 @@ from rigwatch.recorder.folders import LONGEST_BREAK, choose, note_last
 from rigwatch.recorder.past import PastServer
 from rigwatch.recorder.positions import PositionFile, Positions
 from rigwatch.recorder.remote_feed import RemoteFeed
+from rigwatch.recorder.resuming import of_living
 from rigwatch.recorder.retention import Retention
 from rigwatch.recorder.store import Store
 from rigwatch.wire.bus import Bus, joined
@@ -55,6 +56,7 @@ class Recorder:
         self.settings = config.recorder or RecorderSection()
         root, remote = Path(self.settings.folder), self.settings.remote
         place = choose(root, run, math.inf if remote else LONGEST_BREAK)
+        place = of_living(bus, place) if place.changed else place
         self.store = Store(place.folder, run, self.settings.segment)
         self.feed = RemoteFeed(bus, place) if remote else Feed(bus, place.last, place.positions)
         self._bus = bus

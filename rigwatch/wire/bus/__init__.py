@@ -32,6 +32,7 @@ from rigwatch.wire.bus.connection import (
 )
 from rigwatch.wire.bus.inbox import Inbox
 from rigwatch.wire.bus.member import unique_process
+from rigwatch.wire.bus.message_ring import SAID_KEY
 from rigwatch.wire.bus.ring_questions import RingQuestions
 from rigwatch.wire.bus.subscription import MOST_COMMANDS, QUEUE_CAPACITY, Subscription
 from rigwatch.wire.bus.transport import DENIED_MARK, MAX_PAYLOAD, REFUSED_MARK, Close
@@ -44,6 +45,7 @@ __all__ = [
     "PATIENCE",
     "QUEUE_CAPACITY",
     "REFUSED_MARK",
+    "SAID_KEY",
     "Bus",
     "Close",
     "CommandCheck",
