@@ -5,7 +5,7 @@ from rigwatch.wire.host.disk_space import free_share
 from rigwatch.wire.host.ending import set_at_hangup, set_at_signal
 from rigwatch.wire.host.few_pools import use_few_pools
 from rigwatch.wire.host.heartbeat import Heartbeat
-from rigwatch.wire.host.holding import hold
+from rigwatch.wire.host.one_keeper import hold
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
 from rigwatch.wire.host.realtime import DAQ, MONITOR, ROUTER, prepare_for_real_time, raise_priority
 from rigwatch.wire.host.side_by_side import Part, Pulse, RigPulse, Work, run_side_by_side
