@@ -27,14 +27,20 @@ _TIMEOUT = 5.0
 _CREDENTIALS = struct.Struct("3i")
 """Process, user and group at the other end of a socket."""
 _LONGEST_COMMAND = 200
+_IN_MEMORY = "/dev/shm"
 Answer = Callable[[str], str]
 
 
 def control_path(rig: str) -> Path:
     """The socket of the plant of the rig `rig`."""
-    return (
-        Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()) / f"rigwatch-{rig}.plant"
-    )
+    return Path(os.environ.get("XDG_RUNTIME_DIR") or _temporary()) / f"rigwatch-{rig}.plant"
+
+
+def _temporary() -> str:
+    try:
+        return tempfile.gettempdir()
+    except FileNotFoundError:  # the disk is full
+        return _IN_MEMORY
 
 
 def holder(path: Path) -> str:
