@@ -114,7 +114,8 @@ class Witness:
             **self._outputs.counters,
         }
         state = MONITOR_STALE if stale else "running"
-        health = Health(PROCESS, t_ns, state, self._announcer.trouble, counters)
+        trouble = self._announcer.trouble or self._outputs.trouble
+        health = Health(PROCESS, t_ns, state, trouble, counters)
         self._bus.publish(HEALTH, health)
         self._outputs.renew(now, t_ns, silent, stale=stale)
 
