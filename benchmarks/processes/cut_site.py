@@ -73,7 +73,7 @@ def row(seconds: float) -> Row:
     """The row of a cut of so many seconds."""
     with live_rig(needs_model=False) as rig:
         found = cut(rig, seconds)
-        own, far = (open_session(next((rig.folder / name).iterdir())) for name in ("own", "far"))
+        own, far = (open_session(next((rig.folder / name).glob("*Z*"))) for name in ("own", "far"))
         counts = {line.name: differing(own, far, line.name) for line in (SAMPLES, ESTIMATES)}
         counts |= {line.name: plain(own, far, line.name) for line in (ALARMS, EVENTS, HEALTH)}
     wrong = sum(missing + more for missing, more, _ in counts.values())
@@ -174,7 +174,7 @@ def figures(heard: Subscription, wanted: Callable[[Counters], object]) -> Counte
 
 def up_to_date(root: Path) -> bool:
     """Whether estimates are recorded as far as samples; the rings need a while to give theirs."""
-    session = open_session(next(root.iterdir()))
+    session = open_session(next(root.glob("*Z*")))
     ends = [last_block(session, line) for line in (SAMPLES, ESTIMATES)]
     samples, estimates = (int(block.t_ns[-1]) if block else 0 for block in ends)
     return estimates > samples - 2 * 10**9

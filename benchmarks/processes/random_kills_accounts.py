@@ -63,7 +63,7 @@ class Recording:
 def accounts_of(folder: Path) -> list[Account]:
     """All accounts of a rig's folder: what listeners heard, and what was recorded."""
     listeners = {path.stem: read_recording([path], path.stem) for path in folder.glob(HEARD)}
-    recorded = read_recording(sorted((folder / SESSIONS).iterdir()), "recorder")
+    recorded = read_recording(sorted((folder / SESSIONS).glob("*Z*")), "recorder")
     recorded.ended_ns = min(one.ended_ns for one in listeners.values())
     readers = dict(sorted(listeners.items())) | {"the recording": recorded}
     records = read_journal(folder / JOURNAL)[0]

@@ -72,6 +72,8 @@ class AlarmJournal:
         if not self._waiting:
             return
         try:
+            if not os.fstat(self._file).st_nlink:
+                self._begin_anew()
             _write_all(self._file, self._waiting)
             os.fsync(self._file)
             if os.fstat(self._file).st_size > self._largest:
@@ -90,15 +92,43 @@ class AlarmJournal:
 
         A complete journal is at the path at all times: a kill or power cut loses nothing.
         """
-        beside = self.path.with_name(f"{self.path.name}.new")
-        beside.write_bytes(journal_text(self._newest.values()))
-        file = os.open(beside, os.O_RDWR | os.O_APPEND)
+        beside, file = self._fresh()
         try:
-            os.fsync(file)
             for number in range(KEPT - 1, 0, -1):
                 if (older := self._set_aside(number)).exists():
                     older.replace(self._set_aside(number + 1))
             self._set_aside(1).hardlink_to(self.path)
+        except OSError:
+            os.close(file)
+            raise
+        self._take(beside, file)
+
+    def _begin_anew(self) -> None:
+        """Somebody has removed the file: what is written to it now would be lost without an error.
+
+        A file that has come in its place, as of a backup, is set aside.
+        """
+        if self.path.exists():
+            self.path.replace(self.path.with_name(f"{self.path.name}.set-aside"))
+        self._take(*self._fresh())
+        self._waiting.clear()  # the newest of each alarm is there
+
+    def _fresh(self) -> tuple[Path, int]:
+        """A file beside the journal that holds the newest record of each alarm, and open."""
+        beside = self.path.with_name(f"{self.path.name}.new")
+        beside.parent.mkdir(parents=True, exist_ok=True)
+        beside.write_bytes(journal_text(self._newest.values()))
+        file = os.open(beside, os.O_RDWR | os.O_APPEND)
+        try:
+            os.fsync(file)
+        except OSError:
+            os.close(file)
+            raise
+        return beside, file
+
+    def _take(self, beside: Path, file: int) -> None:
+        """Put what is beside the journal in its place, and write to it from now on."""
+        try:
             beside.replace(self.path)
         except OSError:
             os.close(file)

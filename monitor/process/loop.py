@@ -7,6 +7,7 @@ commands ─▶ alarms ─┘          link, silence, losses ─▶ alarms
 import threading
 import time
 from collections.abc import Iterable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 from monitor.alarms import AlarmJournal, Announcement, Occasion, just_returned
@@ -22,13 +23,14 @@ from monitor.process.operator_desk import OperatorDesk
 from monitor.process.presence import Presence
 from monitor.process.startup_grace import Patience
 from monitor.signals import MONITOR_RESET
-from rigwatch.wire.bus import Bus, CommandCheck, joined, serve_alarm_list
+from rigwatch.wire.bus import Bus, Close, CommandCheck, joined, serve_alarm_list
 from rigwatch.wire.delivery import POSITION_WRONG, SampleReader
-from rigwatch.wire.errors import ConfigError, SessionError
+from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.host import (
     MONITOR,
     Heartbeat,
     both_clocks,
+    hold,
     prepare_for_real_time,
     raise_priority,
     set_at_signal,
@@ -67,7 +69,7 @@ class MonitorProcess:
 
     Raises:
         ConfigError: a section of [monitor.alarms] names no alarm, or a detector does not suit.
-        SessionError: journal or cursor cannot be opened.
+        SessionError: journal or cursor cannot be opened, or another process keeps them.
     """
 
     def __init__(self, config: RigConfig, path: Path | str, model: RigModel, bus: Bus) -> None:
@@ -76,7 +78,7 @@ class MonitorProcess:
         friction = FRICTION in section.detectors
         self.rig = RigMonitor(model, section.alarms, detectors, str(path), friction)
         self.bus = bus
-        self._journal, self._cursor = _opened(section.journal)
+        self._give_up, self._journal, self._cursor = _opened(section.journal)
         self._done = self._cursor.read() if self._cursor else None
         self._stale_after = config.stale_after
         self._links = LinkWatch(self._stale_after)
@@ -206,6 +208,7 @@ class MonitorProcess:
         for kept in (self._journal, self._cursor):
             if kept:
                 kept.close()
+        self._give_up()
 
     def _change_models(self) -> None:
         """Apply model changes; all samples read so far have been processed."""
@@ -302,16 +305,18 @@ class MonitorProcess:
         )
 
 
-def _opened(journal: str) -> tuple[AlarmJournal | None, Cursor | None]:
-    """Journal and position at a path, both or neither: a rig that cannot start keeps no file."""
+def _opened(journal: str) -> tuple[Close, AlarmJournal | None, Cursor | None]:
+    """Lock, journal and position at a path, all or none: a rig that cannot start keeps no file."""
     if not journal:
-        return None, None
-    opened = AlarmJournal(journal)
-    try:
-        return opened, Cursor(f"{journal}.position")
-    except SessionError:
-        opened.close()
-        raise
+        return lambda: None, None, None
+    with ExitStack() as opened:
+        give_up = hold(Path(f"{journal}.lock"), f"{journal}: alarm journal")
+        opened.callback(give_up)
+        kept = AlarmJournal(journal)
+        opened.callback(kept.close)
+        cursor = Cursor(f"{journal}.position")
+        opened.pop_all()
+        return give_up, kept, cursor
 
 
 def monitor_section(config: RigConfig, path: Path | str) -> MonitorSection:

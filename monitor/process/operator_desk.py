@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from monitor.alarms import AlarmManager, Announcement, bounded
-from rigwatch.wire.bus import MOST_COMMANDS, Bus, CommandCheck, command_mark
+from rigwatch.wire.bus import MOST_COMMANDS, Bus, CommandCheck, command_mark, marked
 from rigwatch.wire.messages import COMMANDS, MONITOR_STALE, AlarmCommand, Event
 
 SOURCE = "monitor/alarms"
@@ -43,7 +43,7 @@ class OperatorDesk:
     ) -> list[Announcement]:
         verdict, kept = self._check.judge(command), bounded(command, now_ns)
         if not verdict.refusal:
-            return alarms.command(kept, verdict.identity)
+            return list(marked(alarms.command(kept, verdict.identity), command))
         text = f"{kept.action} of {kept.name} by {kept.user} refused: {verdict.refusal}"
         mark = command_mark(command)
         return [Event(SOURCE, now_ns, "warning", "alarm_command_refused", f"{text} ({mark})")]

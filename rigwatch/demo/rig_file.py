@@ -2,6 +2,7 @@
 
 import os
 import time
+from itertools import chain, count
 from pathlib import Path
 
 import msgspec
@@ -22,6 +23,7 @@ from rigwatch.wire.rig_config import (
     load_rig,
 )
 from rigwatch.wire.typed_files import as_toml, find_file
+from sim_plant.serve import control_path, holder
 
 NAME = "rig.toml"
 MODEL = "model.toml"
@@ -30,7 +32,7 @@ _HOST = "127.0.0.1"
 
 
 def write_rig_file(source: Path, folder: Path, viewer: str) -> Path:
-    """Write the rig's configuration into `folder`, with free ports in place of used ones.
+    """Write the rig's configuration into `folder`, with a free name and ports for used ones.
 
     Args:
         source: configuration of a simulated rig on a serial line.
@@ -44,7 +46,7 @@ def write_rig_file(source: Path, folder: Path, viewer: str) -> Path:
     own = structs.replace(
         config,
         base="",
-        rig=config.rig if bus is config.bus else _another(config.rig, bus),
+        rig=_free_rig(config.rig, bus, alone=bus is config.bus),
         bus=bus,
         daq=_serial(config.daq, folder),
         plant=_plant(config.plant, folder),
@@ -77,9 +79,11 @@ def _free_bus(bus: BusSection) -> BusSection:
     return structs.replace(bus, router=endpoint, listen=endpoint)
 
 
-def _another(rig: RigSection, bus: BusSection) -> RigSection:
-    """The rig under a unique name, beside one that is already running."""
-    return structs.replace(rig, id=f"{rig.id}-{bus.listen.rpartition(':')[2]}")
+def _free_rig(rig: RigSection, bus: BusSection, *, alone: bool) -> RigSection:
+    """The rig, under a unique name beside one that is already running or being started."""
+    other = f"{rig.id}-{bus.listen.rpartition(':')[2]}"
+    names = chain([rig.id] if alone else [], [other], (f"{other}-{number}" for number in count(2)))
+    return structs.replace(rig, id=next(name for name in names if not holder(control_path(name))))
 
 
 def _line(folder: Path) -> str:

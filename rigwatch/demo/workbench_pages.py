@@ -48,4 +48,4 @@ def _tell(process: "subprocess.Popen[str]", say: Callable[[str], None]) -> None:
     assert process.stdout is not None
     line = process.stdout.readline()
     if line:
-        say(f"workbench: {json.loads(line)['address']}")
+        say(f"to see the rig and study its alarms, open {json.loads(line)['address']}")

@@ -25,6 +25,7 @@ class Kept:
         change: what mending does, in words; empty if there is nothing to mend.
         mend: writes the mended file; it finds the old one at its path and in its backup.
         remedy: what a person does where nothing can be mended.
+        backup: whether the file is kept beside it as it was.
     """
 
     what: str
@@ -34,6 +35,7 @@ class Kept:
     change: str = ""
     mend: Callable[[], None] | None = None
     remedy: str = ""
+    backup: bool = True
 
     def finding(self, config: Path) -> Finding:
         """What was found, with the command that mends it."""
@@ -51,12 +53,13 @@ def mended(kept: Kept) -> Finding:
     assert kept.mend is not None
     backup = backup_of(kept.path)
     try:
-        shutil.copy2(kept.path, backup)
+        if kept.backup:
+            shutil.copy2(kept.path, backup)
         kept.mend()
     except OSError as error:
         raise ConfigError(kept.path, "", reason_of(error), "a file to write") from error
-    text = f"{kept.path}: {kept.text}; done: {kept.change}; as it was: {backup.name}"
-    return Finding(kept.what, "ok", text)
+    before = f"; as it was: {backup.name}" if kept.backup else ""
+    return Finding(kept.what, "ok", f"{kept.path}: {kept.text}; done: {kept.change}{before}")
 
 
 def backup_of(path: Path) -> Path:

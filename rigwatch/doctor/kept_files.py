@@ -6,12 +6,15 @@ journal         monitor            the same, and lines that were torn
 position        monitor            damaged, or beyond what a device can have sent
 positions       recorder           damaged
 session         recorder           segments without an end, of a recorder that was killed
+unfinished      every process      what a process that was killed had begun to write
 """
 
+import os
 import re
 import time
 from collections.abc import Iterator
 from functools import partial
+from glob import escape
 from pathlib import Path
 
 from monitor.alarms import journal_text, read_journal
@@ -23,7 +26,7 @@ from rigwatch.recorder import POSITIONS, load_positions, sessions_of
 from rigwatch.wire.delivery import LARGEST_SEQ
 from rigwatch.wire.errors import ConfigError, RigwatchError
 from rigwatch.wire.host import replace_file
-from rigwatch.wire.new_file import new_file
+from rigwatch.wire.new_file import PART, left_behind, new_file
 from rigwatch.wire.rig_config import RigConfig, load_rig
 from rigwatch.wire.session import SUFFIX, Session, open_session, recover
 from rigwatch.wire.typed_files import loads, read_text
@@ -59,6 +62,7 @@ def kept_files(config: RigConfig, path: Path) -> Iterator[Kept]:
             yield from _position(journal.with_name(f"{journal.name}.position"))
     if config.recorder is not None:
         yield from _recordings(Path(config.recorder.folder), config.rig.id)
+    yield from _unfinished(config, path)
 
 
 def in_use(config: RigConfig) -> Iterator[Path]:
@@ -164,6 +168,32 @@ def _segments(folder: Path, *, is_last: bool) -> Iterator[Kept]:
         yield Kept("session", path, "it was never closed", "warn", change, partial(_close, session))
 
 
+def _unfinished(config: RigConfig, path: Path) -> Iterator[Kept]:
+    """Files that a killed process has begun beside those of the rig."""
+    for folder, names in _places(config, path):
+        for part in left_behind(folder, f"{names}*{PART}"):
+            size = part.stat().st_size / 1e6
+            text = f"{size:.1f} MB that a process wrote which is gone; its file is as it was before"
+            yield Kept("unfinished", part, text, "warn", "remove it", part.unlink, backup=False)
+
+
+def _places(config: RigConfig, path: Path) -> Iterator[tuple[Path, str]]:
+    """Folders in which the processes write, and how the names of their files begin there."""
+    files = [path]
+    if config.monitor is not None:
+        files += [Path(config.monitor.model).with_suffix(""), Path(config.monitor.journal)]
+    if config.witness is not None:
+        files.append(Path(config.witness.heartbeat_file))
+    yield from ((file.parent, escape(file.name)) for file in files if file.name)
+    if config.recorder is not None:
+        yield from (
+            (folder, "") for folder in sessions_of(Path(config.recorder.folder), config.rig.id)
+        )
+
+
 def _close(session: Session) -> None:
+    written = session.path.stat()
     with new_file(session.path, replace=True) as part:
         recover(session, part)
+        # By its time a recording is the newest, or has expired.
+        os.utime(part, ns=(written.st_atime_ns, written.st_mtime_ns))

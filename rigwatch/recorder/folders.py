@@ -4,10 +4,17 @@
 
 A recorder that was killed and restarted continues in the same folder, or after a long interruption
 in a new one, and queries the rings for what it missed. What they no longer have is a gap. After one
-that was stopped on purpose, a new session begins with the samples from then on.
+that was stopped on purpose, a new session begins with the samples from then on, unless the stop was
+short: a recorder that is started anew with a changed configuration misses nothing.
+
+`<recorder.folder>/.<rig>.last` names the session that was recorded last: by the times of files, one
+of a day on which the clock was years ahead would be the newest until that year.
 """
 
+import contextlib
+import math
 import re
+import time
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -16,6 +23,7 @@ from pathlib import Path
 
 from rigwatch.recorder.positions import Positions, load_positions
 from rigwatch.wire.errors import SessionError
+from rigwatch.wire.host import replace_file
 from rigwatch.wire.messages import SAMPLES, Block, RunInfo, Topic
 from rigwatch.wire.session import SUFFIX, Session, open_session
 
@@ -33,11 +41,13 @@ class Place:
     Attributes:
         last: (boot, seq) of the last sample recorded, None to begin with the next one.
         positions: the same for numbered messages.
+        changed: they are those of a recording with another configuration.
     """
 
     folder: Path
     last: tuple[int, int] | None = None
     positions: Positions = field(default_factory=dict)
+    changed: bool = False
 
 
 def sessions_of(root: Path, rig: str) -> Iterator[Path]:
@@ -47,13 +57,27 @@ def sessions_of(root: Path, rig: str) -> Iterator[Path]:
             yield path
 
 
+def note_last(folder: Path, rig: str) -> None:
+    """Note that `folder` is the session that is recorded now."""
+    place = _last(folder.parent, rig)
+    try:
+        replace_file(place, folder.name, durable=False)
+    except OSError:
+        with contextlib.suppress(OSError):
+            place.unlink()  # rather none than a wrong one
+
+
+def _last(root: Path, rig: str) -> Path:
+    return root / f".{rig}.last"
+
+
 def newest(root: Path, rig: str) -> Path:
     """The newest of a rig's sessions, one that is still written included.
 
     Raises:
         SessionError: there is none.
     """
-    found = _newest_first(root, rig)
+    found = _newest_first(root, rig, time.time_ns())
     if not found:
         raise SessionError(f"{root}: found no recording of {rig}, expected one of its recorder")
     return found[0]
@@ -72,6 +96,8 @@ def choose(root: Path, run: RunInfo, longest_break: float = LONGEST_BREAK) -> Pl
         return before.place
     stamp = datetime.fromtimestamp(run.t_ns // 1_000_000_000, UTC).strftime("%Y%m%dT%H%M%SZ")
     folder = _unused(root / f"{run.rig}-{stamp}")
+    if before is None and math.isfinite(longest_break):
+        return _just_ended(folder, root, run)
     if before is None or before.stopped:
         return Place(folder)
     return Place(folder, before.place.last, before.place.positions)
@@ -124,24 +150,52 @@ def _interrupted(root: Path, run: RunInfo) -> _Interrupted | None:
     return newest
 
 
+def _just_ended(folder: Path, root: Path, run: RunInfo) -> Place:
+    """A new session, after one of another configuration if that has just ended."""
+    _, before = next(_ends(root, run), ("", None))
+    if before is None or abs(run.t_ns - before.ended_ns) > LONGEST_BREAK * 1e9:
+        return Place(folder)
+    return Place(folder, before.place.last, before.place.positions, changed=True)
+
+
 def _sessions(root: Path, run: RunInfo) -> Iterator[_Interrupted]:
     """Sessions of this rig, the newest first, back to another configuration."""
-    for folder in _newest_first(root, run.rig):
+    for configuration, one in _ends(root, run):
+        if configuration != run.configuration_sha256:
+            return
+        yield one
+
+
+def _ends(root: Path, run: RunInfo) -> Iterator[tuple[str, _Interrupted]]:
+    """The hash of the configuration and the end of each session of this rig, the newest first."""
+    for folder in _newest_first(root, run.rig, run.t_ns):
         try:
             session = open_session(folder)
-            if session.info.configuration_sha256 != run.configuration_sha256:
-                return
-            yield _end_of(session)
+            yield session.info.configuration_sha256, _end_of(session)
         except (OSError, SessionError, ValueError):
             continue  # killed before its first message
 
 
-def _newest_first(root: Path, rig: str) -> list[Path]:
+def _newest_first(root: Path, rig: str, now_ns: int) -> list[Path]:
+    """Sessions with files by the time of the last one; those ahead of the clock come last.
+
+    The one that was recorded last is where its time says: the clock may have been set back since.
+    """
+    last = ""
+    with contextlib.suppress(OSError, ValueError):
+        last = _last(root, rig).read_text(encoding="utf-8")
     try:
         folders = [path for path in sessions_of(root, rig) if any(path.glob(f"*{SUFFIX}"))]
-        return sorted(folders, key=_written_ns, reverse=True)
+        written = {path: _written_ns(path) for path in folders}
     except OSError:
         return []
+    known = any(path.name == last for path in folders)
+
+    def place(path: Path) -> tuple[bool, int]:
+        ahead = known and path.name != last and written[path] > now_ns
+        return not ahead, written[path]
+
+    return sorted(folders, key=place, reverse=True)
 
 
 def _written_ns(folder: Path) -> int:

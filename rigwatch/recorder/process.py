@@ -12,14 +12,15 @@ from pathlib import Path
 
 from rigwatch.recorder.disk import DiskWatch
 from rigwatch.recorder.feed import Feed
-from rigwatch.recorder.folders import LONGEST_BREAK, choose
+from rigwatch.recorder.folders import LONGEST_BREAK, choose, note_last
 from rigwatch.recorder.past import PastServer
 from rigwatch.recorder.positions import PositionFile, Positions
 from rigwatch.recorder.remote_feed import RemoteFeed
+from rigwatch.recorder.resuming import of_living
 from rigwatch.recorder.retention import Retention
 from rigwatch.recorder.store import Store
 from rigwatch.wire.bus import Bus, joined
-from rigwatch.wire.host import Heartbeat, Pulse, free_share, use_few_pools
+from rigwatch.wire.host import Heartbeat, Pulse, free_share, hold, use_few_pools
 from rigwatch.wire.messages import (
     ALARMS,
     ESTIMATES,
@@ -55,10 +56,11 @@ class Recorder:
         self.settings = config.recorder or RecorderSection()
         root, remote = Path(self.settings.folder), self.settings.remote
         place = choose(root, run, math.inf if remote else LONGEST_BREAK)
+        place = of_living(bus, place) if place.changed else place
         self.store = Store(place.folder, run, self.settings.segment)
         self.feed = RemoteFeed(bus, place) if remote else Feed(bus, place.last, place.positions)
         self._bus = bus
-        self._settled = 0
+        self._settled = self._noted = 0
         self._disk = DiskWatch()
         self._retention = Retention(self.settings, config.rig.id)
         self._told_at = -HEALTH_EVERY
@@ -90,11 +92,18 @@ class Recorder:
     def _flush(self, now: float, t_ns: int) -> None:
         taken = self.feed.positions()
         self._tell(self.store.flush(now, t_ns))
+        self._note_segment()
         if not self.store.failure:
             self._settled = t_ns - UNSETTLED_NS
         if not self.store.failure and taken != self._kept:
             self._kept = taken
             self._positions.save(taken)
+
+    def _note_segment(self) -> None:
+        """Note the session with each segment: somebody may have removed the note."""
+        if self.store.segment_count != self._noted and not self.store.failure:
+            self._noted = self.store.segment_count
+            note_last(self.store.folder, self._bus.rig)
 
     def _tell(self, events: list[Event]) -> None:
         for event in events:
@@ -131,7 +140,20 @@ class Recorder:
 
 
 def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event, pulse: Pulse) -> Path:
-    """Record until `stop` is set, telling `pulse` of each turn; returns the session's folder."""
+    """Record until `stop` is set, telling `pulse` of each turn; returns the session's folder.
+
+    Raises:
+        SessionError: another process records this rig into the same folder.
+    """
+    root = Path((config.recorder or RecorderSection()).folder)
+    give_up = hold(root / f".{config.rig.id}.lock", f"{root}: recording of {config.rig.id}")
+    try:
+        return _record(config, run, bus, stop, pulse)
+    finally:
+        give_up()
+
+
+def _record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event, pulse: Pulse) -> Path:
     recorder = Recorder(config, run, bus)
     pulse.ready(f"recording to {recorder.store.folder}")
     while not stop.wait(recorder.settings.flush * _OF_FLUSH):
@@ -167,6 +189,7 @@ def run(path: Path | str, stop: threading.Event, notes: str = "") -> Path | None
     Raises:
         ConfigError: the configuration is invalid.
         BusError: the router's endpoint is invalid.
+        SessionError: see `record`.
     """
     use_few_pools()
     config = load_rig(path)

@@ -56,8 +56,6 @@ class Retention:
         removed = [one for one in self.expired(t_ns / 1e9, current) if _remove(one.path)]
         if not removed:
             return []
-        for one in removed:
-            self._alarms.pop(one.path, None)
         size = sum(one.size for one in removed) / 1e6
         text = f"{len(removed)} segment(s) removed, {size:.1f} MB: older or larger than configured"
         return [Event("recorder", t_ns, "info", "RECORDING_EXPIRED", text)]
@@ -66,7 +64,9 @@ class Retention:
         """Segments to be removed, oldest first, those without alarms before those with alarms."""
         newest = _newest(current)
         kept = _size(newest) if newest else 0
-        return expired(self._segments(newest), self._settings, now_s, kept)
+        found = list(self._segments(newest))
+        self._alarms = {one.path: one.alarms for one in found}  # others remove segments too
+        return expired(found, self._settings, now_s, kept)
 
     def _segments(self, newest: Path | None) -> Iterator[Segment]:
         root = Path(self._settings.folder)

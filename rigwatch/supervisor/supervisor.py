@@ -9,6 +9,7 @@ A process that dies does not affect the others: each reconnects by itself.
 """
 
 import contextlib
+import os
 import selectors
 import shutil
 import signal
@@ -22,6 +23,7 @@ from typing import Literal
 from rigwatch.supervisor.child import Child
 from rigwatch.supervisor.plan import ProcessPlan
 from rigwatch.supervisor.vitals import Limits, Vitals
+from rigwatch.wire.errors import RigwatchError
 
 Kind = Literal[
     "started",
@@ -36,6 +38,7 @@ Kind = Literal[
     "stopped",
     "changed",
 ]
+IN_MEMORY = "/dev/shm"
 TURN = 0.1
 """Time between two checks of the processes [s]."""
 
@@ -86,6 +89,9 @@ class Supervisor:
         report: called with every event.
         limits: time limits.
         clock: seconds on a monotonic clock [s].
+
+    Raises:
+        RigwatchError: there is no folder for the sockets of the processes.
     """
 
     def __init__(
@@ -98,7 +104,7 @@ class Supervisor:
         self._report = report
         self._limits = limits or Limits()
         self._clock = clock
-        self._folder = Path(tempfile.mkdtemp(prefix="rigwatch-"))
+        self._folder = _own_folder()
         self._selector = selectors.DefaultSelector()
         self._watched = {plan.name: self._new(plan) for plan in plans}
         self._stopped = False
@@ -291,6 +297,16 @@ class Supervisor:
     def _say(self, watched: Watched, kind: Kind, text: str) -> None:
         child = watched.child
         self._report(ProcessEvent(child.plan.name, kind, text, child.pid, watched.restarts))
+
+
+def _own_folder() -> Path:
+    """A folder for sockets, in memory where the disk is full: a rig has to start nevertheless."""
+    places = (None, os.environ.get("XDG_RUNTIME_DIR"), IN_MEMORY)
+    for place in places:
+        with contextlib.suppress(OSError):
+            return Path(tempfile.mkdtemp(prefix="rigwatch-", dir=place))
+    expected = f"expected room in TMPDIR or {IN_MEMORY}"
+    raise RigwatchError(f"no folder can be made for sockets, {expected}")
 
 
 def how_it_ended(code: int, last_line: str) -> str:

@@ -3,9 +3,13 @@
 A command that fails, is interrupted or killed leaves the file that was there before, or none.
 """
 
+import contextlib
 import glob
+import math
 import os
+import re
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,6 +17,9 @@ from pathlib import Path
 from rigwatch.wire.errors import RigwatchError, SessionError, reason_of
 
 PART = ".part"
+_NAME = re.compile(r".+\.(?P<process>\d+)\.part")
+_START = 19
+"""Place of a process's start in what /proc says of it behind its name, in ticks from the boot."""
 
 
 @contextmanager
@@ -22,7 +29,7 @@ def new_file(
     """A path beside `path` to write to: what stands there becomes `path` when the block ends.
 
     It is on the disk by then. A block that raises leaves nothing; what a killed process leaves
-    beside `path` is removed when the file is written again.
+    beside `path` is removed when the file is written again, or by `rigwatch doctor --fix`.
 
     Args:
         path: the file.
@@ -38,10 +45,10 @@ def new_file(
     if target.exists() and not target.is_file():
         part = target
     else:
-        part = target.with_name(f"{target.name}.{os.getpid()}{PART}")
+        part = part_of(target)
     try:
         if part is not target:
-            _remove_left_behind(target)
+            remove_left_behind(target)
         yield part
         if part is not target:
             _put(part, target, replace=replace)
@@ -101,19 +108,49 @@ def _name_anew(part: Path, target: Path) -> None:
         part.rename(target)
 
 
-def _remove_left_behind(target: Path) -> None:
-    """Remove what processes that are gone have begun to write."""
-    for part in target.parent.glob(f"{glob.escape(target.name)}.*{PART}"):
-        number = part.name.removeprefix(f"{target.name}.").removesuffix(PART)
-        if number.isdecimal() and not _is_running(int(number)):
+def part_of(target: Path) -> Path:
+    """Where this process writes what becomes `target`."""
+    return target.with_name(f"{target.name}.{os.getpid()}{PART}")
+
+
+def remove_left_behind(target: Path) -> None:
+    """Remove what processes that are gone have begun to write in place of `target`."""
+    for part in left_behind(target.parent, f"{glob.escape(target.name)}.*{PART}"):
+        if part.name.removesuffix(PART).rpartition(".")[0] == target.name:
             part.unlink(missing_ok=True)
 
 
-def _is_running(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
+def left_behind(folder: Path, names: str = f"*{PART}") -> list[Path]:
+    """Files in `folder` that processes began to write which are gone."""
+    return sorted(part for part in folder.glob(names) if _is_left_behind(part))
+
+
+def _is_left_behind(part: Path) -> bool:
+    named = _NAME.fullmatch(part.name)
+    if named is None or not part.is_file():
         return False
-    except PermissionError:
+    process = int(named["process"])
+    if process == os.getpid():
         return True
-    return process != os.getpid()
+    try:
+        return _began(process) > part.stat().st_mtime and not _has_open(process, part)
+    except OSError:
+        return False  # put in its place meanwhile
+
+
+def _began(process: int) -> float:
+    """When a process began as Unix time [s]: numbers come again. Infinite if it is gone."""
+    try:
+        told = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return math.inf
+    ticks = int(told.rpartition(")")[2].split()[_START])
+    return time.time() - time.clock_gettime(time.CLOCK_BOOTTIME) + ticks / os.sysconf("SC_CLK_TCK")
+
+
+def _has_open(process: int, part: Path) -> bool:
+    """Whether it writes there: after a step of the clock it seems to have begun later."""
+    found = Path(f"/proc/{process}/fd").glob("*")
+    with contextlib.suppress(OSError):
+        return str(part.resolve()) in {os.path.realpath(one) for one in found}
+    return False

@@ -3,22 +3,28 @@
 Another watchdog raises an alarm when they stop, whatever ended: monitor, witness or the machine.
 """
 
-import contextlib
 import threading
 import urllib.request
 from pathlib import Path
 
-from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.errors import ConfigError, reason_of
 from rigwatch.wire.host import replace_file
 
 TIMEOUT = 5.0
 """Longest wait for the answer to a ping [s]."""
 
 
-def write_beat(path: Path, rig: str, t_ns: int) -> None:
-    """Renew the heartbeat file, whose age shows when the monitor last published."""
-    with contextlib.suppress(OSError):
+def write_beat(path: Path, rig: str, t_ns: int) -> str:
+    """Renew the heartbeat file, whose age shows when the monitor last published.
+
+    Returns:
+        why it cannot be written; "" if it is.
+    """
+    try:
         replace_file(path, f"{t_ns / 1e9:.3f} {rig} running\n", durable=False)
+    except OSError as error:
+        return f"heartbeat file {path} cannot be written: {reason_of(error)}"
+    return ""
 
 
 class Pinger:

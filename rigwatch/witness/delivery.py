@@ -7,6 +7,7 @@ import json
 import logging
 import os
 import queue
+import signal
 import subprocess
 import threading
 import time
@@ -144,15 +145,20 @@ def _sender(recipient: RecipientSection, rig: str, file: Path) -> Send:
 
 def _run_command(command: Sequence[str], notice: Notice, rig: str) -> bool:
     alarm = notice.alarm
-    done = subprocess.run(
+    with subprocess.Popen(
         [*command, alarm.name, alarm.severity, alarm.cause],
-        input=json.dumps(json_fields(alarm)).encode(),
-        env={**os.environ, "RIGWATCH_RIG": rig},
+        stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
-        timeout=COMMAND_S,
-        check=False,
-    )
-    return done.returncode == 0
+        env={**os.environ, "RIGWATCH_RIG": rig},
+        process_group=0,
+    ) as process:
+        try:
+            process.communicate(json.dumps(json_fields(alarm)).encode(), COMMAND_S)
+        finally:
+            # What hangs is often not the command but what it has started.
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
+    return process.returncode == 0
 
 
 def _apprise_sender(recipient: RecipientSection, rig: str, file: Path) -> Send:

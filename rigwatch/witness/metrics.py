@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rigwatch.wire.access import authority_file, key_files
 from rigwatch.wire.errors import ConfigError, MissingExtraError, RigwatchError, reason_of
-from rigwatch.wire.messages import Alarm, Health
+from rigwatch.wire.messages import Alarm, Health, remember
 from rigwatch.wire.rig_config import SecuritySection
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Figures:
     def take_alarm(self, alarm: Alarm) -> None:
         """Take note of an alarm."""
         with self._lock:
-            self._alarms[alarm.name] = alarm
+            remember(self._alarms, alarm)
 
     def take_health(self, health: Health, now: float) -> None:
         """Take note of a health message received at `now` [s]."""

@@ -8,7 +8,7 @@ not, as the work causes it.
 from dataclasses import dataclass, field
 from datetime import datetime
 
-from rigwatch.wire.messages import Alarm
+from rigwatch.wire.messages import MOST_ALARMS, Alarm
 from rigwatch.witness.people import SEVERITIES, PeopleFile, RecipientSection
 
 AGAIN_S = 600.0
@@ -74,6 +74,8 @@ class Notices:
         else:
             unseen.ended = None
         unseen.alarm = alarm
+        if len(self._unseen) > MOST_ALARMS:
+            del self._unseen[next(iter(self._unseen))]
 
     def due(self, now: float, wall: datetime) -> list[Notice]:
         """Notices to send now, each returned once.

@@ -19,6 +19,7 @@ class Outputs:
 
     Attributes:
         figures: what the endpoint serves.
+        trouble: why an output is not renewed, in one line; "" for nothing.
 
     Raises:
         ConfigError: an output is invalid.
@@ -27,6 +28,7 @@ class Outputs:
 
     def __init__(self, settings: WitnessSection, bus: Bus, security: SecuritySection) -> None:
         self.figures = Figures(bus.rig)
+        self.trouble = ""
         self._file = Path(settings.heartbeat_file) if settings.heartbeat_file else None
         url, seconds = settings.heartbeat_url, settings.heartbeat_seconds
         self._pinger = Pinger(url, seconds) if url else None
@@ -54,7 +56,7 @@ class Outputs:
         for health in self._healths.drain() if self._healths else ():
             self.figures.take_health(health, now)
         if not stale and self._file:
-            write_beat(self._file, self.figures.rig, t_ns)
+            self.trouble = write_beat(self._file, self.figures.rig, t_ns)
         if not stale and self._pinger:
             self._pinger.beat(now)
 

@@ -14,6 +14,7 @@ from rigwatch.wire.bus import (
     CommandCheck,
     ask_alarm_list,
     joined,
+    marked,
     serve_alarm_list,
 )
 from rigwatch.wire.errors import BusError
@@ -100,7 +101,7 @@ class Witness:
     def _obey(self, t_ns: int) -> None:
         """Execute operators' commands, a few per turn."""
         for command in self._commands.drain(MOST_COMMANDS):
-            for said in self._stale.command(command, t_ns):
+            for said in marked(self._stale.command(command, t_ns), command):
                 self._bus.publish(ALARMS if isinstance(said, Alarm) else EVENTS, said)
 
     def _report(self, now: float, t_ns: int) -> None:
@@ -113,7 +114,8 @@ class Witness:
             **self._outputs.counters,
         }
         state = MONITOR_STALE if stale else "running"
-        health = Health(PROCESS, t_ns, state, self._announcer.trouble, counters)
+        trouble = self._announcer.trouble or self._outputs.trouble
+        health = Health(PROCESS, t_ns, state, trouble, counters)
         self._bus.publish(HEALTH, health)
         self._outputs.renew(now, t_ns, silent, stale=stale)
 

@@ -1,7 +1,7 @@
 """The interfaces of the simulated device: serial frames on a pty, Modbus over TCP or a pty."""
 
 from sim_plant.serve.commands import Commands, Controlled
-from sim_plant.serve.control import ControlServer, ask, control_path
+from sim_plant.serve.control import ControlServer, ask, control_path, holder
 from sim_plant.serve.line_faults import LineFaults
 from sim_plant.serve.modbus_server import ModbusServer
 from sim_plant.serve.pty_bridge import PtyBridge
@@ -23,4 +23,5 @@ __all__ = [
     "SerialServer",
     "ask",
     "control_path",
+    "holder",
 ]

@@ -15,6 +15,7 @@ The answer begins with "ok" or "error".
 import contextlib
 import os
 import socket
+import struct
 import tempfile
 import threading
 from collections.abc import Callable
@@ -23,14 +24,47 @@ from pathlib import Path
 from rigwatch.wire.errors import DeviceError, RigwatchError, reason_of
 
 _TIMEOUT = 5.0
+_CREDENTIALS = struct.Struct("3i")
+"""Process, user and group at the other end of a socket."""
+_LONGEST_COMMAND = 200
+_IN_MEMORY = "/dev/shm"
 Answer = Callable[[str], str]
 
 
 def control_path(rig: str) -> Path:
     """The socket of the plant of the rig `rig`."""
-    return (
-        Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()) / f"rigwatch-{rig}.plant"
-    )
+    return Path(os.environ.get("XDG_RUNTIME_DIR") or _temporary()) / f"rigwatch-{rig}.plant"
+
+
+def _temporary() -> str:
+    try:
+        return tempfile.gettempdir()
+    except FileNotFoundError:  # the disk is full
+        return _IN_MEMORY
+
+
+def holder(path: Path) -> str:
+    """The process that answers at `path`, in words; empty if none does."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        probe.setblocking(False)
+        try:
+            probe.connect(str(path))
+        except BlockingIOError:
+            return "a process that hangs"  # its queue of connections is full
+        except OSError:
+            return ""
+        found = probe.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+    process, _, _ = _CREDENTIALS.unpack(found)
+    return f"process {process}{_command(process)}"
+
+
+def _command(process: int) -> str:
+    """Its command line, in brackets; empty if it is not to be seen."""
+    with contextlib.suppress(OSError):
+        words = Path(f"/proc/{process}/cmdline").read_bytes().split(b"\0")
+        line = " ".join(word.decode(errors="replace") for word in words if word)
+        return f" ({line[:_LONGEST_COMMAND]})"
+    return ""
 
 
 def ask(path: Path, line: str) -> str:
@@ -61,6 +95,9 @@ class ControlServer:
     Args:
         path: the socket; a stale one is replaced.
         answer: the reply to a line; a `RigwatchError` becomes an "error" line.
+
+    Raises:
+        DeviceError: another process answers there, or the socket cannot be made.
     """
 
     def __init__(self, path: Path, answer: Answer) -> None:
@@ -69,14 +106,16 @@ class ControlServer:
         self._socket: socket.socket | None = None
 
     def __enter__(self) -> "ControlServer":
-        if self._alive():
-            raise DeviceError(f"a simulated rig runs already: it answers at {self._path}")
-        with contextlib.suppress(FileNotFoundError):
-            self._path.unlink()
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._socket.bind(str(self._path))
-        self._path.chmod(0o600)
-        self._socket.listen(4)
+        if other := holder(self._path):
+            raise DeviceError(
+                f"a simulated rig of this name runs already: {other} answers at {self._path};"
+                " stop it, or give this rig another rig.id"
+            )
+        try:
+            self._listen()
+        except OSError as error:
+            self.__exit__()
+            raise DeviceError(f"{self._path}: cannot listen here: {reason_of(error)}") from error
         threading.Thread(target=self._serve, name="plant-control", daemon=True).start()
         return self
 
@@ -89,9 +128,12 @@ class ControlServer:
         with contextlib.suppress(OSError):
             self._path.unlink()
 
-    def _alive(self) -> bool:
-        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
-            return probe.connect_ex(str(self._path)) == 0
+    def _listen(self) -> None:
+        self._path.unlink(missing_ok=True)
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._socket.bind(str(self._path))
+        self._path.chmod(0o600)
+        self._socket.listen(4)
 
     def _serve(self) -> None:
         listener = self._socket

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -33,6 +34,10 @@ def faulty_manager() -> AlarmManager:
     alarms.command(order("dry_friction", "acknowledge", text="looking"))
     alarms.command(order("gap", "shelve"))
     return alarms
+
+
+def states(manager: AlarmManager) -> dict[str, str]:
+    return {alarm.name: alarm.state for alarm in manager.standing()}
 
 
 def restarted(path: Path) -> AlarmManager:
@@ -208,6 +213,30 @@ def test_a_journal_that_has_grown_is_rotated_and_keeps_the_state_of_every_alarm(
     reopened = AlarmJournal(path)
     assert {one.alarm.name for one in reopened.newest()} == {one.alarm.name for one in changes}
     reopened.close()
+
+
+@pytest.mark.parametrize("replaced", [False, True])
+def test_a_journal_that_somebody_removes_is_written_anew_with_the_state_of_every_alarm(
+    tmp_path, replaced
+):
+    path = tmp_path / "of the rig" / "alarms.jsonl"
+    old = faulty_manager()
+    journal = AlarmJournal(path)
+    journal.write(old.take_changes())
+    shutil.rmtree(path.parent)
+    if replaced:
+        path.parent.mkdir()
+        path.write_text("of a backup\n")
+    old.command(order("sensor_stuck.position", "acknowledge"))
+    changes = old.take_changes()
+    journal.write(changes)
+    assert journal.failure == ""
+    assert states(restarted(path)) == states(old) != {}
+    journal.write(changes)
+    assert read_journal(path)[0][-len(changes) :] == changes
+    journal.close()
+    set_aside = path.with_name("alarms.jsonl.set-aside")
+    assert (set_aside.is_file() and set_aside.read_text() == "of a backup\n") == replaced
 
 
 def test_a_journal_without_identities_is_read(tmp_path):

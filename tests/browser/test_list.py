@@ -1,6 +1,9 @@
 """The list of studies: it shows what a study's process does, and what changed meanwhile."""
 
+import contextlib
 import shutil
+import signal
+from collections.abc import Iterator
 
 import pytest
 
@@ -43,3 +46,24 @@ def test_a_running_task_is_shown_and_its_result_when_it_ends(page: Page, study: 
     # What is removed elsewhere leaves the list by itself.
     shutil.rmtree(study.folder)
     page.until(lambda: not page.all(ROW), "the study is gone")
+
+
+@contextlib.contextmanager
+def hanging(page: Page, served: Served) -> Iterator[None]:
+    """The server hangs, and in the eyes of the page some time passes."""
+    served.process.send_signal(signal.SIGSTOP)
+    page.run("const now = Date.now; Date.now = () => now() + 20000;")
+    try:
+        yield
+    finally:
+        served.process.send_signal(signal.SIGCONT)
+
+
+def test_a_page_whose_server_hangs_says_that_it_is_old_until_it_goes_on(
+    page: Page, served: Served
+) -> None:
+    page.open("/")
+    page.until(lambda: page.run("return performance.getEntriesByType('resource').length > 0"), "it")
+    with hanging(page, served):
+        page.until(lambda: "the figures are old" in page.text("#old"), "that it hangs")
+    page.until(lambda: not page.text("#old"), "that it goes on")

@@ -5,8 +5,9 @@ import threading
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from rigwatch.wire.bus import Bus
+from rigwatch.wire.bus import Bus, sender
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.bus.message_ring import REPLY_BYTES, MessageRing
 from rigwatch.wire.bus.ring_questions import RingQuestions
@@ -219,6 +220,38 @@ def test_an_alarm_in_the_name_of_another_is_dropped_and_counted():
     say(monitor, range(1, 3))
     assert heard(listener, 2) == [0, 1, 2]
     assert (listener.foreign, listener.rejected) == (2, 2)
+
+
+def test_what_a_process_said_is_heard_though_its_end_came_first(monkeypatch: pytest.MonkeyPatch):
+    network = MemoryNetwork()
+    monitor, stranger = network.bus("r", "monitor"), network.bus("r", "stranger")
+    listener = network.bus("r", "listener").listen(ALARMS)
+    say(monitor, range(2))
+    assert monitor._outlet is not None
+    monitor._outlet._token.close()  # its end overtakes what follows
+    key, run = monitor.key(ALARMS.key), monitor._outlet.run
+    for number in (1, 2, 10**9):
+        stranger.transport.put(key, encode(alarm(666)), Numbered(run, number, b"").mark)
+    say(monitor, range(2, 4))
+    monitor.transport.put(key, encode(alarm(3)), Numbered(run, 3, b"").mark)
+    assert heard(listener, 3) == [0, 1, 2, 3]
+    assert (listener.foreign, listener.lost) == (3, 0)
+    monkeypatch.setattr(sender, "LATE", 0.0)
+    say(monitor, range(4, 6))
+    assert not listener.drain()
+    assert listener.foreign == 5
+
+
+def test_the_only_word_of_a_process_is_heard_though_its_end_came_first():
+    network = MemoryNetwork()
+    listener = network.bus("r", "listener").listen(ALARMS)
+    monitor = network.bus("r", "monitor")
+    monitor.announce()
+    assert monitor._outlet is not None
+    monitor._outlet._token.close()
+    network.servers.clear()  # its ring has ended, too
+    say(monitor, range(1))
+    assert heard(listener, 0) == [0]
 
 
 def test_what_the_ring_no_longer_has_is_counted_and_reported():

@@ -9,9 +9,9 @@ from rigwatch.wire.delivery.ring import SampleRing
 from rigwatch.wire.delivery.sample_reader import SampleReader
 from rigwatch.wire.messages import SAMPLES, Event, SampleBlock
 from rigwatch.wire.ordering.outcomes import FORGED, POSITION_WRONG, Loss
-from rigwatch.wire.ordering.ownership import Owners
+from rigwatch.wire.ordering.ownership import MOST_UNPROVED, Owners
 from rigwatch.wire.ordering.sample_order import SUSPECT, SampleOrder
-from tests.bus.samples import block
+from tests.bus.samples import block, is_intact
 from tests.bus.test_sample_order import Bench
 from tests.waiting import wait_until
 
@@ -72,6 +72,52 @@ def test_the_first_token_owns_a_boot_until_it_is_gone() -> None:
     owners.vanished(7, 100)
     assert owners.admits(7, "daq again")
     assert not owners.admits(7, "daq")
+
+
+def test_a_boot_whose_owner_is_gone_is_no_strangers() -> None:
+    owners = Owners()
+    owners.appeared(7, 100, "daq")
+    owners.vanished(7, 100)
+    assert not owners.admits(7, "eve")
+    assert owners.admits(7, "daq"), "its last samples were overtaken by its end"
+    for boot in range(1000, 1000 + 2 * MOST_UNPROVED):
+        owners.admits(boot, "eve")
+    assert not owners.admits(7, "eve")
+    owners.appeared(7, 200, "daq again")
+    assert owners.admits(7, "daq again")
+    assert not owners.admits(7, "daq")
+
+
+def test_samples_after_the_end_of_their_source_are_its_own_and_no_conflict_with_its_next() -> None:
+    network = MemoryNetwork()
+    daq, eve, again = (network.bus("bench", name) for name in ("daq", "eve", "again"))
+    ring = SampleRing(daq, 4096)
+    reader = SampleReader(network.bus("bench", "reader"))
+
+    def send(part: SampleBlock) -> None:
+        ring.add(part)
+        daq.publish(SAMPLES, part)
+
+    send(block(0, 4))
+    ring.close()
+    forged = block(4, 4)
+    forged.channels[0].values[:] = -1.0
+    eve.publish(SAMPLES, forged)
+    daq.publish(SAMPLES, block(4, 4))
+    again.publish(SAMPLES, block(8, 4))  # before its token
+    items = reader.read(0.0)
+    assert reader.position == (7, 7)
+    assert reader.counters.foreign == 8
+    SampleRing(again, 4096).add(block(8, 4))
+    again.publish(SAMPLES, block(8, 4))
+    items += reader.read(0.0)
+    assert reader.position == (7, 11)
+    assert all(is_intact(item) for item in items if isinstance(item, SampleBlock))
+    assert [item.code for item in items if isinstance(item, Event)] == [
+        "JOINED",
+        "DUPLICATE SOURCE",
+    ]
+    reader.close()
 
 
 def test_one_who_spoke_before_the_token_came_does_not_keep_the_boot() -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from rigwatch.commands import main
 from rigwatch.wire.errors import SessionError
+from rigwatch.wire.host import replace_file
 from rigwatch.wire.messages import Column, SampleBlock
 from rigwatch.wire.new_file import new_file
 from rigwatch.wire.session import SessionWriter, run_info
@@ -152,3 +153,13 @@ def test_a_report_may_go_to_a_device() -> None:
     with new_file(Path("/dev/null"), replace=True) as part:
         part.write_text("nothing")
     assert Path("/dev/null").is_char_device()
+
+
+def test_a_file_that_cannot_be_replaced_stays_and_nothing_is_beside_it(tmp_path: Path) -> None:
+    target, left = tmp_path / "model.toml", tmp_path / f"model.toml.{2**22 + 1}.part"
+    replace_file(target, "before")
+    left.write_text("of a killed process")
+    with largest_file(90), pytest.raises(OSError, match="File too large"):
+        replace_file(target, "x" * 200)
+    assert target.read_text() == "before"
+    assert began(target) == [target]

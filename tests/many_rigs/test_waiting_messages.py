@@ -1,7 +1,6 @@
 """What waits in Zenoh's channel for a process of several rigs: each message once and in order."""
 
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -66,18 +65,11 @@ def test_what_a_process_said_before_its_end_is_not_taken_for_lost(
 ) -> None:
     other = connect(rig.config, "other", PATIENCE, links)
     alarms, outside = other.listen(ALARMS), rig.bus("outside")
-    told, heard = outside.listen(ALARMS), list[int]()
-
-    def arrived(last: int) -> bool:
-        heard.extend(message.seq for message in told.catch_up(0.05))
-        return last in heard
-
     for run in range(3):
         monitor = connect(rig.config, "monitor", PATIENCE)
         eventually(lambda: "alive/monitor" in outside.tokens("alive/*"), "its token")
         for seq in range(3):
             monitor.publish(ALARMS, alarm(10 * run + seq))
-        eventually(partial(arrived, 10 * run + 2), "its messages")  # an end may overtake them
         monitor.close()
         eventually(lambda: "alive/monitor" not in outside.tokens("alive/*"), "its end")
     said: list[int] = []

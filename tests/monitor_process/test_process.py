@@ -1,5 +1,6 @@
 """The monitor's process on a bus in memory: what it says to samples, gaps, commands and silence."""
 
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,7 @@ from monitor.pipeline.rig_monitor import RigMonitor
 from monitor.process.link_watch import LinkWatch, Seen
 from monitor.process.loop import MonitorProcess, suitable_model
 from rigwatch.wire.access import signer_of
+from rigwatch.wire.bus.commands.alarm_command import command_alarms
 from rigwatch.wire.bus.commands.alarm_list import ask_alarm_list
 from rigwatch.wire.bus.commands.command_check import signed
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
@@ -19,7 +21,13 @@ from rigwatch.wire.bus.subscription import Subscription
 from rigwatch.wire.delivery.ring import SampleRing
 from rigwatch.wire.errors import BusError, ConfigError
 from rigwatch.wire.messages.blocks import concatenate
-from rigwatch.wire.messages.message_types import AlarmCommand, EstimateBlock, Health, SampleBlock
+from rigwatch.wire.messages.message_types import (
+    Alarm,
+    AlarmCommand,
+    EstimateBlock,
+    Health,
+    SampleBlock,
+)
 from rigwatch.wire.messages.protobuf import encode
 from rigwatch.wire.messages.topics import (
     ALARMS,
@@ -34,7 +42,7 @@ from rigwatch.wire.rig_config import load_rig
 from tests.bus.publisher import wave
 from tests.bus.rig import PATIENCE, TestRig
 from tests.monitor_process.model import MODEL, monitor_section
-from tests.waiting import wait_until
+from tests.waiting import eventually, wait_until
 
 
 class Bench:
@@ -192,6 +200,34 @@ def test_commands_are_obeyed_and_refusals_explained(bench: Bench) -> None:
     bench.turn()
     codes = [event.code for event in bench.heard[EVENTS].drain()]
     assert "alarm_command_refused" in codes
+
+
+def test_of_two_operators_at_once_one_is_obeyed_and_only_the_other_is_refused(
+    bench: Bench,
+) -> None:
+    bench.send(wave(0, 1, 7, 0))
+    bench.turn()
+    at = Occasion("rig", 7, 0, time.time_ns())
+    bench.monitor.say(bench.monitor.rig.alarms.report("disk", at, active=True))
+    answers: dict[str, tuple[list[Alarm], str]] = {}
+
+    def acknowledge(user: str) -> None:
+        signer = signer_of(bench.config.bus.security, "")
+        bus = bench.network.bus("bench", user, signer)
+        answers[user] = command_alarms(bus, AlarmCommand("disk", "acknowledge", user, 1))
+
+    users = [threading.Thread(target=acknowledge, args=(user,)) for user in ("ann", "bob")]
+    for user in users:
+        user.start()
+    eventually(lambda: len(bench.monitor._operators._commands) == 2, "both commands")
+    bench.turn()
+    for user in users:
+        user.join()
+    obeyed = {user for user, (changes, _) in answers.items() if changes}
+    refused = {user: why for user, (_, why) in answers.items() if why}
+    assert len(obeyed) == 1
+    assert refused.keys() == {"ann", "bob"} - obeyed
+    assert [*refused.values()] == ["acknowledge of disk refused: it is acknowledged"]
 
 
 def test_a_killed_monitor_has_its_alarms_and_misses_no_sample(bench: Bench) -> None:

@@ -8,9 +8,11 @@ import pytest
 
 from rigwatch.browser.rig.onset import onset_of
 from rigwatch.recorder import newest
+from rigwatch.recorder.folders import choose, note_last
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import Alarm, Column, SampleBlock
 from rigwatch.wire.session import SessionWriter, run_info
+from tests.bus.samples import block
 
 STAMP = "20260501T120000Z"
 
@@ -50,3 +52,29 @@ def test_an_onset_is_looked_for_in_recordings_of_the_rig(root: Path) -> None:
     onset = onset_of(root, "bench", alarm)
     assert onset.t_ns == 1_005
     assert onset.session.path == root / f"bench-{STAMP}"
+
+
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parametrize("last", ["20270115T080000Z", "20311016T000000Z"])
+def test_a_recorder_goes_on_where_it_was_after_a_day_with_the_clock_ahead(
+    tmp_path: Path, last: str, *, closed: bool
+) -> None:
+    now = 1_800_000_000
+    days = {"20311016T000000Z": (now + 150_000_000, 5), "20270115T080000Z": (now, 7)}
+    for stamp, (begin, boot) in days.items():
+        folder = tmp_path / f"bench-{stamp}"
+        folder.mkdir()
+        run = run_info("bench", 256.0, t_ns=begin * 10**9, configuration_sha256="x")
+        writer = SessionWriter(folder / "000001.mcap", run)
+        writer.write(block(0, 100, boot=boot, start_ns=begin * 10**9))
+        writer.flush()
+        if closed and stamp != last:
+            writer.close()
+        writer.abandon()
+        os.utime(folder / "000001.mcap", (begin + 1, begin + 1))
+        if stamp == last:
+            note_last(folder, "bench")
+    run = run_info("bench", 256.0, t_ns=(now + 10) * 10**9, configuration_sha256="x")
+    place = choose(tmp_path, run)
+    assert place.last == (days[last][1], 99)
+    assert (place.folder.name == f"bench-{last}") == (last == "20270115T080000Z")

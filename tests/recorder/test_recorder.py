@@ -76,11 +76,11 @@ def disk(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
     return disk
 
 
-def block(seq: int, n: int = 1) -> SampleBlock:
+def block(seq: int, n: int = 1, boot: int = 7) -> SampleBlock:
     index = np.arange(seq, seq + n)
     column = Column("voltage", "V", index.astype(np.float64), np.zeros(n, np.uint8))
     t_ns = time.time_ns() + index * 3_906_250
-    return SampleBlock("rig", 7, seq, index * 3906, t_ns, (column,))
+    return SampleBlock("rig", boot, seq, index * 3906, t_ns, (column,))
 
 
 def alarm(seq: int) -> Alarm:
@@ -90,12 +90,12 @@ def alarm(seq: int) -> Alarm:
 class Source:
     """Stands where the acquisition stands: ring and publisher on the bus."""
 
-    def __init__(self, bus: Bus, kept: int = 65536) -> None:
-        self.bus, self.ring, self.next = bus, SampleRing(bus, kept), 0
+    def __init__(self, bus: Bus, kept: int = 65536, boot: int = 7) -> None:
+        self.bus, self.ring, self.next, self.boot = bus, SampleRing(bus, kept), 0, boot
 
     def send(self, count: int) -> None:
         for _ in range(count):
-            part = block(self.next)
+            part = block(self.next, boot=self.boot)
             self.ring.add(part)
             self.bus.publish(SAMPLES, part)
             self.next += 1
@@ -125,6 +125,8 @@ def test_everything_said_is_kept_once(config: Path) -> None:
     monitor.publish(ALARMS, alarm(1))
     recorder.turn(0.0, time.time_ns())
     recorder.close(1.0, time.time_ns())
+    last = recorder.store.folder.with_name(".bench1.last")
+    assert last.read_text() == recorder.store.folder.name
     session = open_session(recorder.store.folder)
     counts: dict[str, int] = {}
     for item in session.messages():
@@ -230,6 +232,45 @@ def test_a_session_goes_on_after_a_short_break_only(tmp_path: Path, config: Path
     other = run_info("bench1", 256.0, t_ns=run.t_ns, configuration_sha256="changed")
     assert choose(tmp_path / "sessions", other).folder != folder
     assert choose(tmp_path / "nowhere", run).last is None
+
+
+@pytest.mark.parametrize("restarted", [False, True])
+def test_a_recorder_started_anew_with_a_changed_configuration_misses_nothing(
+    config: Path, *, restarted: bool
+) -> None:
+    network = MemoryNetwork()
+    daq, monitor = network.bus("bench1", "daq"), network.bus("bench1", "monitor")
+    source, rig = Source(daq), load_rig(config)
+    run = describe_run(config, rig)
+    before = Recorder(rig, run, network.bus("bench1", "recorder"))
+    source.send(30)
+    monitor.publish(ALARMS, alarm(0))
+    before.turn(0.0, time.time_ns())
+    before.close(0.0, time.time_ns())
+    if restarted:
+        source.ring.close()
+        source = Source(daq, boot=8)
+    source.send(10)
+    monitor.publish(ALARMS, alarm(1))
+    changed = dataclasses.replace(run, configuration_sha256="changed")
+    recorder = Recorder(rig, changed, network.bus("bench1", "recorder"))
+    assert recorder.store.folder != before.store.folder
+    source.send(5)
+    alarms = recorder.feed._numbered["alarms"]
+
+    def complete() -> bool:
+        recorder.turn(0.0, time.time_ns())
+        samples = recorder.feed.samples >= (5 if restarted else 15)
+        return samples and alarms.positions().get("monitor", (0, 0))[1] == 1
+
+    eventually(complete, "what was sent meanwhile is recorded")
+    recorder.close(1.0, time.time_ns())
+    # What another start of the device sent belongs to no recording.
+    assert recorded(recorder.store.folder) == list(range(10, 15) if restarted else range(30, 45))
+    session = open_session(recorder.store.folder)
+    assert [item.message for item in session.messages(["gaps"])] == []
+    kept = [item.message for item in session.messages(["alarms"])]
+    assert [message.seq for message in kept if isinstance(message, Alarm)] == [1]
 
 
 def test_after_a_kill_and_a_long_break_a_new_session_has_what_the_ring_kept_and_a_gap(
@@ -381,7 +422,7 @@ def test_killed_and_started_again_over_zenoh(tmp_path: Path, config: Path) -> No
         bus.close()
     assert second.returncode == 0
     folder = Path(json.loads(output)["session"])
-    assert list((tmp_path / "sessions").iterdir()) == [folder]
+    assert list((tmp_path / "sessions").glob("bench1-*")) == [folder]
     seqs = recorded(folder)
     assert seqs == list(range(seqs[0], seqs[-1] + 1))
     assert len(seqs) > 300

@@ -108,3 +108,15 @@ def test_the_segment_being_written_counts_for_the_size(tmp_path: Path) -> None:
     two = (sizes[1] + sizes[2] + sizes[0] // 2) / 1e9
     assert rules(tmp_path, keep_gigabytes=two).update(0.0, int(NOW * 1e9), current)
     assert left(tmp_path) == {f"{current.name}/{number:06d}" for number in (2, 3)}
+
+
+def test_what_others_remove_is_forgotten(tmp_path: Path) -> None:
+    old, current = tmp_path / "bench-20260101T000000Z", tmp_path / "bench-20260301T000000Z"
+    path = segment(old, 1, 1.0)
+    segment(current, 1, 0.0)
+    retention = rules(tmp_path, keep_days=400.0)
+    assert retention.expired(NOW, current) == []
+    assert set(retention._alarms) == {path}
+    path.unlink()
+    assert retention.expired(NOW, current) == []
+    assert not retention._alarms

@@ -1,5 +1,6 @@
 """The recorder's store against a disk that fills up, is missing, and comes back."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +67,22 @@ def test_a_full_disk_costs_nothing_while_memory_lasts(tmp_path: Path) -> None:
     assert store.dropped_samples == 0
     assert recorded(tmp_path / "s") == list(range(168))
     assert len(open_session(tmp_path / "s").segments) >= 2
+
+
+def test_a_folder_that_somebody_removes_is_told_and_recording_goes_on_in_a_new_one(
+    tmp_path: Path,
+) -> None:
+    store = Store(tmp_path / "s", RUN, segment=3600.0)
+    store.add(block(0))
+    store.flush(0.0, 0)
+    shutil.rmtree(tmp_path / "s")
+    store.add(block(8))
+    (told,) = store.flush(0.5, 0)
+    assert (told.code, "it has been removed" in told.text) == ("RECORDING_STOPPED", True)
+    store.add(block(16))
+    assert codes(store.flush(1.5, 0)) == ["RECORDING_RESUMED"]
+    store.close(2.0, 0)
+    assert recorded(tmp_path / "s") == list(range(8, 24))
 
 
 def test_what_memory_cannot_hold_is_dropped_and_counted(tmp_path: Path) -> None:

@@ -1,5 +1,8 @@
 """People change the rig while it runs, and are told plainly when that cannot be."""
 
+import contextlib
+import os
+import socket
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -79,13 +82,30 @@ def test_nonsense_is_refused_in_plain_words(
         ask(running[0], line)
 
 
-def test_a_second_plant_of_the_same_rig_is_refused(tmp_path: Path) -> None:
+def test_a_second_plant_of_the_same_rig_is_refused_with_the_process_that_holds_its_place(
+    tmp_path: Path,
+) -> None:
     with (
         ControlServer(tmp_path / "control", lambda line: ""),
-        pytest.raises(DeviceError, match="runs already"),
+        pytest.raises(DeviceError, match=rf"runs already: process {os.getpid()} \(.*pytest"),
         ControlServer(tmp_path / "control", lambda line: ""),
     ):
         pass
+
+
+def test_a_plant_that_hangs_holds_its_place_and_nobody_waits_for_it(tmp_path: Path) -> None:
+    path = tmp_path / "control"
+    with socket.socket(socket.AF_UNIX) as hangs, contextlib.ExitStack() as queue:
+        hangs.bind(str(path))
+        hangs.listen(0)
+        queue.enter_context(socket.socket(socket.AF_UNIX)).connect(str(path))
+        with pytest.raises(DeviceError, match="a process that hangs"):
+            ControlServer(path, lambda line: "").__enter__()
+
+
+def test_a_place_where_no_socket_can_be_is_said_plainly(tmp_path: Path) -> None:
+    with pytest.raises(DeviceError, match="cannot listen here"):
+        ControlServer(tmp_path / ("long" * 30), lambda line: "").__enter__()
 
 
 def test_no_plant_is_reported_plainly(tmp_path: Path) -> None:
@@ -94,8 +114,6 @@ def test_no_plant_is_reported_plainly(tmp_path: Path) -> None:
 
 
 def test_a_socket_that_a_dead_plant_left_is_replaced(tmp_path: Path) -> None:
-    import socket
-
     left = socket.socket(socket.AF_UNIX)
     left.bind(str(tmp_path / "control"))
     left.close()

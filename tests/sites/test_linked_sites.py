@@ -94,7 +94,7 @@ class Sites:
         self.recorder.send_signal(signal.SIGTERM)
         self.recorder.wait(PATIENCE)
         self.site_records(2 * RATE)
-        (own,), (far,) = ((self.folder / name).iterdir() for name in ("site", "far"))
+        (own,), (far,) = ((self.folder / name).glob("*Z*") for name in ("site", "far"))
         return own, far
 
 

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from rigwatch.demo.narrator import Narrator, acts
+from rigwatch.demo.own_folder import own_folder
 from rigwatch.demo.rig_file import write_rig_file
 from rigwatch.demo.verdict import complaints, read_recording
+from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.messages.message_types import Alarm, Column, EstimateBlock, SampleBlock
 from rigwatch.wire.rig_config import SerialSection, load_rig
 from rigwatch.wire.session import SessionWriter, run_info
@@ -177,3 +179,15 @@ def test_a_wrong_name_no_alarm_and_no_estimates_are_complained_about(recorded: R
     assert any("no alarm named dry friction; alarms: other_fault" in line for line in found)
     assert any("not in the recording" in line for line in found)
     assert any("no estimates" in line for line in found)
+
+
+def test_a_second_demonstration_takes_a_folder_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with own_folder(None) as first, own_folder(None) as second:
+        assert (first, second) == (Path("demo-session"), Path("demo-session-2"))
+        with pytest.raises(RigwatchError, match="another demonstration"), own_folder(second):
+            pass
+    with own_folder(None) as again:
+        assert again == first

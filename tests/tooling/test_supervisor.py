@@ -3,15 +3,18 @@
 import os
 import signal
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from rigwatch.supervisor import supervisor
 from rigwatch.supervisor.plan import ProcessPlan
 from rigwatch.supervisor.supervisor import ProcessEvent, Supervisor, how_it_ended
 from rigwatch.supervisor.vitals import Limits, Vitals
+from rigwatch.wire.errors import RigwatchError
 
 LIMITS = Limits(start=20, silence=1.0, stall=1.5, stop=2, first_pause=0.1, settled=3)
 
@@ -193,3 +196,18 @@ def test_a_source_that_has_just_come_back_gives_its_readers_time() -> None:
 def test_exit_codes_in_words() -> None:
     assert how_it_ended(-9, "") == "ended by SIGKILL"
     assert how_it_ended(2, "no such port") == "ended with code 2: no such port"
+
+
+def test_sockets_are_in_memory_where_the_disk_is_full(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "full"))
+    monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
+    monkeypatch.setattr(supervisor, "IN_MEMORY", str(tmp_path))
+    made = Supervisor([], lambda _: None)
+    assert made._folder.parent == tmp_path
+    made._stop_all()
+    assert not list(tmp_path.iterdir())
+    monkeypatch.setattr(supervisor, "IN_MEMORY", str(tmp_path / "full"))
+    with pytest.raises(RigwatchError, match="expected room in TMPDIR"):
+        Supervisor([], lambda _: None)

@@ -1,5 +1,6 @@
 """`rigwatch up` with the real router, simulated rig and acquisition on a real serial line."""
 
+import contextlib
 import json
 import os
 import queue
@@ -19,6 +20,7 @@ from rigwatch.demo.rig_file import write_rig_file
 from rigwatch.wire.host.ports import endpoint_address, free_port
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.typed_files.shipped import find_config
+from sim_plant.serve import ControlServer, control_path
 from tests.waiting import eventually
 
 pytestmark = pytest.mark.xdist_group("rig")
@@ -158,3 +160,19 @@ def test_beside_a_rig_that_is_up_another_gets_ports_and_a_name_of_its_own(
         second = load_rig(write_rig_file(find_config("demo.toml"), tmp_path, "web"))
     assert second.bus.listen != first.bus.listen
     assert second.rig.id != first.rig.id
+
+
+def test_beside_a_simulated_rig_of_its_name_a_demonstration_gets_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    source = tmp_path / "demo.toml"
+    port = f"{free_port()}"
+    source.write_text(find_config("demo.toml").read_text().replace("7447", port))
+    names = []
+    with contextlib.ExitStack() as running:
+        for _ in range(3):
+            rig = load_rig(write_rig_file(source, tmp_path, "web")).rig.id
+            running.enter_context(ControlServer(control_path(rig), lambda line: line))
+            names.append(rig)
+    assert names == ["demo", f"demo-{port}", f"demo-{port}-2"]

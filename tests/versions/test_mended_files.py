@@ -4,7 +4,10 @@ The files are those of earlier versions, moved into one rig; some are damaged as
 """
 
 import json
+import os
 import re
+import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 from shutil import copy
 
@@ -13,6 +16,7 @@ import pytest
 from monitor.alarms import read_journal
 from monitor.model import load_model, model_versions
 from rigwatch.commands import main
+from rigwatch.recorder import newest
 from rigwatch.wire.host.ports import free_port
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.session import open_session
@@ -39,6 +43,13 @@ def rig_of(version: str, folder: Path) -> Path:
 def doctor(capsys: pytest.CaptureFixture[str], rig: Path, *more: str) -> Findings:
     main(["doctor", str(rig), "--json", *more])
     return {item["what"]: item for item in json.loads(capsys.readouterr().out)}
+
+
+def list_of(capsys: pytest.CaptureFixture[str], rig: Path, *more: str) -> list[str]:
+    """What is said of unfinished files."""
+    main(["doctor", str(rig), "--json", *more])
+    found = json.loads(capsys.readouterr().out)
+    return [item["text"] for item in found if item["what"] == "unfinished"]
 
 
 def of_rig(folder: Path) -> dict[str, bytes]:
@@ -99,6 +110,52 @@ def test_files_of_an_earlier_version_are_mended_once_with_a_backup_of_each(
     assert not [what for what in again if "--fix" in again[what]["remedy"]]
     doctor(capsys, rig, "--fix")
     assert of_rig(tmp_path) == after
+
+
+@pytest.fixture
+def writer() -> Iterator["subprocess.Popen[bytes]"]:
+    """A process that is there."""
+    with subprocess.Popen(["sleep", "600"]) as process:
+        yield process
+        process.kill()
+
+
+def test_what_a_killed_process_has_begun_to_write_is_told_and_removed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], writer: "subprocess.Popen[bytes]"
+) -> None:
+    rig = rig_of("2026-11-22", tmp_path)
+    session = tmp_path / "sessions" / "demo-20261119T120000Z"
+    number = 2**22 + 1  # larger than any process's
+    gone = [
+        tmp_path / name for name in (f"model.toml.{number}.part", f"alarms.jsonl.{number}.part")
+    ]
+    gone.append(session / f"000001.mcap.{number}.part")
+    others = [tmp_path / name for name in (f"mine.{number}.part", "model.toml.mine.part")]
+    others.append(tmp_path / f"rig.toml.{writer.pid}.part")
+    again = tmp_path / "rig.toml.1.part"  # its number is another process's by now
+    for file in (*gone, *others, again):
+        file.write_text("begun")
+    os.utime(again, (1.0, 1.0))
+    told = list_of(capsys, rig)
+    assert sorted(line.partition(":")[0] for line in told) == sorted(map(str, (*gone, again)))
+    list_of(capsys, rig, "--fix")
+    assert not [file for file in (*gone, again) if file.exists()]
+    assert all(file.read_text() == "begun" for file in others)
+    assert not list(tmp_path.rglob("*.part.backup-*"))
+    assert list_of(capsys, rig) == []
+
+
+def test_a_session_that_is_closed_afterwards_keeps_its_age(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = rig_of("2026-11-22", tmp_path)
+    first = tmp_path / "sessions" / "demo-20261119T120000Z" / "000001.mcap"
+    cut(first, 0.9)
+    os.utime(first, (1e9, 1e9))
+    doctor(capsys, rig, "--fix")
+    assert not open_session(first).unclosed
+    assert first.stat().st_mtime == 1e9
+    assert newest(tmp_path / "sessions", "demo").name == "demo-20261120T120000Z"
 
 
 def test_a_silence_that_earlier_versions_took_is_removed_and_all_else_stays(

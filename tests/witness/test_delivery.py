@@ -3,6 +3,7 @@
 import json
 import socket
 import socketserver
+import subprocess
 import sys
 import threading
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.messages import ALARMS, HEALTH, Health
 from rigwatch.wire.rig_config import WitnessSection
 from rigwatch.witness import delivery
+from rigwatch.witness.notices import Notice
 from rigwatch.witness.process import Witness
 from tests.waiting import eventually
 from tests.witness.test_people import fault
@@ -134,6 +136,19 @@ def test_a_recipient_that_hangs_fills_only_its_own_queue(tmp_path: Path, webhook
     bench.turn()
     eventually(lambda: bench.counted("dropped") >= 19.0, "what does not fit is counted")
     assert bench.counted("waiting") <= delivery.WAITING
+
+
+def test_a_command_that_hangs_is_killed_with_what_it_has_started(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(delivery, "COMMAND_S", 0.2)
+    started = tmp_path / "started"
+    script = f"sleep 600 & echo $! > {started}.new; mv {started}.new {started}; wait"
+    notice = Notice("people", fault("gap", 1.0), 0, 0.0)
+    with pytest.raises(subprocess.TimeoutExpired):
+        delivery._run_command(("sh", "-c", script), notice, "r")
+    child = Path("/proc") / started.read_text().strip() / "stat"
+    eventually(lambda: not child.exists() or ") Z " in child.read_text(), "its child has ended")
 
 
 def test_a_changed_file_is_in_force_and_a_wrong_one_changes_nothing(

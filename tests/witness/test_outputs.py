@@ -120,3 +120,21 @@ def test_a_ping_that_fails_is_counted_and_waits_nowhere() -> None:
     eventually(lambda: pinger.failed == 1, "the failure")
     with pytest.raises(ConfigError, match="http:// or https://"):
         Pinger("file:///etc/passwd", 1.0)
+
+
+def test_a_heartbeat_file_that_cannot_be_written_is_told_until_it_can(tmp_path: Path) -> None:
+    network, file = MemoryNetwork(), tmp_path / "away" / "beat"
+    healths = network.bus("r", "screen").subscribe(HEALTH)
+    settings = WitnessSection(heartbeat_file=str(file))
+    witness = Witness(settings, network.bus("r", "witness"), 0.0)
+
+    def text(now: float) -> str:
+        witness.turn(now, 1)
+        return str(healths.drain()[-1].text)
+
+    assert text(1.0) == ""
+    assert text(2.0) == f"heartbeat file {file} cannot be written: no such file or directory"
+    file.parent.mkdir()
+    text(3.0)
+    assert text(4.0) == ""
+    assert file.is_file()

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from rigwatch.wire.errors import ConfigError
-from rigwatch.wire.messages import Alarm
+from rigwatch.wire.messages import Alarm, newest_alarms, remember
 from rigwatch.wire.rig_config import WitnessSection
+from rigwatch.witness import notices as notices_module
 from rigwatch.witness.notices import Notices
 from rigwatch.witness.people import (
     MaintenanceSection,
@@ -166,3 +167,27 @@ def test_the_command_of_the_section_is_a_recipient(tmp_path: Path) -> None:
     settings = WitnessSection(people=str(file), notify=("tell",), notify_from="warning")
     names = [(one.name, one.lowest) for one in load_people(settings).recipients]
     assert names == [("command", "warning"), ("ann", "error")]
+
+
+def test_alarms_that_a_stranger_makes_up_fill_no_memory_and_the_newest_are_kept(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(newest_alarms, "MOST_ALARMS", 20)
+    monkeypatch.setattr(notices_module, "MOST_ALARMS", 20)
+    who, known = notices(ANN), dict[str, Alarm]()
+    remember(known, fault("over", state="normal"))
+    remember(known, fault("standing"))
+    for number in range(200):
+        who.hear(fault(f"made up {number}"), 0.0)
+        if number < 19:
+            remember(known, fault(f"made up {number}"))
+    assert "over" not in known, "what is over goes first"
+    assert "standing" in known
+    for number in range(200):
+        remember(known, fault(f"made up {number}"))
+    who.hear(fault("real", severity="critical"), 1.0)
+    remember(known, fault("real"))
+    assert len(known) == 20
+    assert "real" in known
+    assert len(told(who, 1)) == 20
+    assert told(who, 11)[-1] == ("ann", "real")

@@ -26,6 +26,9 @@ class RigLink:
     Args:
         path: the rig's configuration.
 
+    Attributes:
+        looked_at: end of the last look at the bus, monotonic time [s].
+
     Raises:
         ConfigError: it cannot be read.
     """
@@ -34,6 +37,7 @@ class RigLink:
         self.path, self.config = path, load_rig(path)
         self._live = LiveView(self.config.rig.sample_rate)
         self._trouble = "connecting to the rig"
+        self.looked_at = time.monotonic()
         self._learns = _learns(path)
         self._lock, self._ended = threading.Lock(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="rig", daemon=True)
@@ -81,8 +85,9 @@ class RigLink:
         while not self._ended.is_set():
             try:
                 bus = connect(self.config, unique_process("workbench"), TIMEOUT)
-            except BusError as error:
+            except RigwatchError as error:  # no router, or keys that cannot be read
                 self._say(str(error))
+                self.looked_at = time.monotonic()
                 self._ended.wait(TIMEOUT)
                 continue
             try:
@@ -102,6 +107,7 @@ class RigLink:
             with self._lock:
                 for message in heard:
                     self._live.take(message, time.monotonic())
+            self.looked_at = time.monotonic()
             self._ended.wait(TURN)
         self._say("the rig's router is gone; waiting for it")
 

@@ -14,6 +14,7 @@ from rigwatch.wire.messages import (
     SampleBlock,
     columns_of,
     json_fields,
+    remember,
 )
 
 SECONDS = 20.0
@@ -53,7 +54,7 @@ class LiveView:
         for alarm in alarms:
             known = self._alarms.get(alarm.name)
             if known is None or known.t_ns <= alarm.t_ns:
-                self._alarms[alarm.name] = alarm
+                remember(self._alarms, alarm)
 
     def alarm(self, name: str) -> Alarm | None:
         """An alarm by name."""
@@ -64,7 +65,7 @@ class LiveView:
         if isinstance(message, SampleBlock | EstimateBlock):
             self._keep(message, now)
         elif isinstance(message, Alarm):
-            self._alarms[message.name] = message
+            remember(self._alarms, message)
         elif isinstance(message, Health):
             self._health[message.source] = message, now
 

@@ -17,16 +17,18 @@ from starlette.staticfiles import StaticFiles
 from rigwatch.browser.server.access import Access, Guard
 from rigwatch.browser.server.application import STATIC, style
 from rigwatch.browser.server.context import NOT_KEPT
-from rigwatch.browser.server.event_streams import STILL_HERE, event, event_stream
+from rigwatch.browser.server.event_streams import (
+    STILL_EVERY,
+    STILL_HERE,
+    event,
+    event_stream,
+    stalled,
+)
 from rigwatch.fleet import Dashboards, RigState, as_live_page, as_part, summary
 from rigwatch.wire.errors import RigwatchError
 
 BETWEEN = 2.0
 """Time between two polls of the rigs [s]."""
-STILL_EVERY = 5.0
-"""Time after which a page without news gets a sign of life [s]."""
-OLD_AFTER = 10.0
-"""Time without a completed poll after which the pages say that their figures are old [s]."""
 States = Callable[[], list[RigState]]
 
 
@@ -48,14 +50,14 @@ class FleetPages:
         self._poll = poll
         self.dashboards = Dashboards()
         self._news = asyncio.Condition()
-        self._seen_at = time.monotonic()
+        self._looked_at = time.monotonic()
 
     async def follow(self) -> None:
         """Poll the rigs, and notify the open pages."""
         while True:
             states = await asyncio.to_thread(self._poll)
             async with self._news:
-                self.states, self._seen_at = states, time.monotonic()
+                self.states, self._looked_at = states, time.monotonic()
                 self._news.notify_all()
             await asyncio.sleep(BETWEEN)
 
@@ -63,9 +65,9 @@ class FleetPages:
         """The rigs now, and whenever something has changed; how old they are if polls stall."""
         sent = b""
         while True:
-            if (silent := time.monotonic() - self._seen_at) > OLD_AFTER:
+            if old := stalled(self._looked_at):
                 sent = b""  # the next poll is sent whatever it shows
-                yield event("old", msgspec.json.encode({"seconds": round(silent)}))
+                yield old
             else:
                 content = msgspec.json.encode(
                     {"summary": summary(self.states), "html": as_part(self.states)}

@@ -10,9 +10,9 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from rigwatch.browser.server.context import answer, body_of, context_of, errors_answered
-from rigwatch.browser.server.event_streams import event, event_stream
+from rigwatch.browser.server.event_streams import STILL_EVERY, STILL_HERE, event, event_stream
 from rigwatch.browser.server.study_routes import job_data
-from rigwatch.browser.work import Desk
+from rigwatch.browser.work import Desk, Told
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.workbench.study import digest, open_study
 
@@ -31,8 +31,6 @@ ARGUMENTS: dict[str, dict[str, type]] = {
 """Tasks that a page may start, with their arguments."""
 CHANGES = frozenset({"add", "undo", "accept_data"})
 AT_THE_RIG = frozenset({"rehearse", "promote", "rollback"})
-HEARTBEAT = 15.0
-"""Longest time without an event [s]."""
 
 
 async def begin(request: Request) -> Response:
@@ -87,12 +85,19 @@ async def _events(desk: Desk) -> AsyncGenerator[bytes, None]:
         what, job = "job", desk.job
         while True:
             yield event(what, msgspec.json.encode(job_data(job)) if what == "job" else b"{}")
-            try:
-                what, job = await asyncio.wait_for(queue.get(), HEARTBEAT)
-            except TimeoutError:
-                what = "still"
+            while (change := await _next(queue)) is None:
+                yield STILL_HERE
+            what, job = change
     finally:
         desk.listeners.leave(queue)
+
+
+async def _next(queue: asyncio.Queue[Told]) -> Told | None:
+    """What a queue brings next; None if it brings nothing for a while."""
+    try:
+        return await asyncio.wait_for(queue.get(), STILL_EVERY)
+    except TimeoutError:
+        return None
 
 
 ROUTES = [

@@ -1,6 +1,7 @@
 """Routes of the list of studies: page, table, and events as tasks proceed and studies change."""
 
 import asyncio
+import time
 from collections.abc import AsyncGenerator, AsyncIterator
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,7 +14,7 @@ from starlette.routing import Route
 
 from rigwatch.browser.recordings import stories
 from rigwatch.browser.server.context import NOT_KEPT, Context, context_of
-from rigwatch.browser.server.event_streams import event, event_stream
+from rigwatch.browser.server.event_streams import event, event_stream, stalled
 from rigwatch.browser.server.study_routes import job_data
 from rigwatch.browser.views import listed, render, stamp, study_folders
 from rigwatch.browser.work import Job
@@ -52,20 +53,25 @@ async def studies_events(request: Request) -> Response:
 
 async def _events(context: Context) -> AsyncGenerator[bytes, None]:
     queue = context.desks.listeners.listen()
+    shown, looked_at = None, time.monotonic()
+    look = asyncio.create_task(run_in_threadpool(_shown, context))
     try:
-        shown = await run_in_threadpool(_shown, context)
         while True:
             active = _active(context)
-            yield _jobs(context, active)
+            yield stalled(looked_at) or _jobs(context, active)
             async for folder, job in _within(queue, EVERY):
                 active = {path: other for path, other in active.items() if path != folder}
                 active |= {folder: job} if job.active else {}
-                yield _jobs(context, active)
-            now = await run_in_threadpool(_shown, context)
-            if now != shown:
+                yield stalled(looked_at) or _jobs(context, active)
+            if not look.done():
+                continue  # a disk may keep it waiting
+            looked_at = time.monotonic()
+            if shown not in (None, look.result()):
                 yield event("studies")
-            shown = now
+            shown = look.result()
+            look = asyncio.create_task(run_in_threadpool(_shown, context))
     finally:
+        look.cancel()
         context.desks.listeners.leave(queue)
 
 

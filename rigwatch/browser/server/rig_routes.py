@@ -22,7 +22,7 @@ from rigwatch.browser.rig import (
     study_of_alarm,
 )
 from rigwatch.browser.server.context import answer, body_of, context_of, errors_answered
-from rigwatch.browser.server.event_streams import STILL_HERE, event, event_stream
+from rigwatch.browser.server.event_streams import STILL_HERE, event, event_stream, stalled
 from rigwatch.browser.server.places import PlaceError
 from rigwatch.browser.views import listed, render
 from rigwatch.wire.access import operator_name
@@ -81,6 +81,11 @@ async def rig_events(request: Request) -> Response:
 async def _events(link: RigLink) -> AsyncGenerator[bytes, None]:
     since, sent = 0, b""
     while True:
+        if old := stalled(link.looked_at):
+            sent = b""  # the next poll is sent whatever it shows
+            yield old
+            await asyncio.sleep(EVERY)
+            continue
         status = as_json(link.status())
         if status != sent:
             sent = status

@@ -1,7 +1,7 @@
 """Long tasks on studies: one process per study, results on disk, cancelling at any time."""
 
 from rigwatch.browser.work.apart import ApartError, apart
-from rigwatch.browser.work.desk import Desk, Desks, Job
+from rigwatch.browser.work.desk import Desk, Desks, Job, Told
 from rigwatch.browser.work.directions import Directions
 from rigwatch.browser.work.rehearsal import model_in_force
 from rigwatch.browser.work.results import FOLDER as RESULTS
@@ -16,6 +16,7 @@ __all__ = [
     "Directions",
     "Job",
     "Results",
+    "Told",
     "apart",
     "model_in_force",
     "results_of",

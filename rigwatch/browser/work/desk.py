@@ -231,7 +231,7 @@ class Desks:
         while True:
             for folder, desk in list(self._desks.items()):
                 if desk.listeners:
-                    now = state(folder)
+                    now = await asyncio.to_thread(state, folder)  # a disk may keep it waiting
                     if seen.setdefault(folder, now) != now:
                         seen[folder] = now
                         desk.tell("study")

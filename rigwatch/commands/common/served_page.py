@@ -5,8 +5,9 @@ import json
 import webbrowser
 
 
-def tell_address(arguments: argparse.Namespace, address: str, label: str = "") -> None:
-    """Print the page's address, after a label, and open it if `--open` is given."""
-    print(json.dumps({"address": address}) if arguments.json else f"{label}{address}", flush=True)
+def tell_address(arguments: argparse.Namespace, address: str, shows: str) -> None:
+    """Print the page's address and what it shows, and open it if `--open` is given."""
+    told = f"open in a browser, to see {shows}: {address}"
+    print(json.dumps({"address": address}) if arguments.json else told, flush=True)
     if arguments.open:
         webbrowser.open(address)

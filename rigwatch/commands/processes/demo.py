@@ -23,7 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="no window; ends once friction is named, with exit code 0 only if it is",
     )
     parser.add_argument("--seconds", type=POSITIVE, metavar="N", help="maximum run time [s]")
-    parser.add_argument("--folder", type=Path, default=Path("demo-session"), help="output folder")
+    parser.add_argument(
+        "--folder", type=Path, help="output folder, else demo-session or, beside another, -2 and on"
+    )
     parser.add_argument(
         "--commission-only", action="store_true", help="make the model of the simulated rig and end"
     )
@@ -31,17 +33,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """0 if the demonstration succeeded."""
-    from rigwatch.demo import (
-        Show,
-        ensure_model,
-        forget_alarms,
-        workbench_pages,
-        write_rig_file,
-    )
+    from rigwatch.demo import own_folder
+
+    with own_folder(arguments.folder) as folder:
+        return _run(arguments, folder)
+
+
+def _run(arguments: argparse.Namespace, folder: Path) -> int:
+    from rigwatch.demo import Show, ensure_model, forget_alarms, workbench_pages, write_rig_file
     from rigwatch.wire.typed_files import find_config
 
-    folder: Path = arguments.folder
-    folder.mkdir(parents=True, exist_ok=True)
     config = find_config("demo.toml")
     ensure_model(config, folder, say)
     if arguments.commission_only:

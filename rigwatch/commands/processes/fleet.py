@@ -73,7 +73,7 @@ def _serve(arguments: argparse.Namespace, fleet: "Fleet") -> int:
         ) from None
 
     def ready(address: str) -> None:
-        tell_address(arguments, address)
+        tell_address(arguments, address, "all rigs, the worst first")
 
     serve_fleet(fleet.states, Listening(port=arguments.port), ready)
     return 0

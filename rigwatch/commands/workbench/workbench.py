@@ -54,7 +54,8 @@ def run(arguments: argparse.Namespace) -> int:
         folder.mkdir(exist_ok=True)
 
     def ready(address: str) -> None:
-        tell_address(arguments, address, "workbench: ")
+        rig = f"the rig of {arguments.rig} and " if arguments.rig else ""
+        tell_address(arguments, address, f"{rig}the studies of {folder}")
         if not arguments.json:
             say("Ctrl-C ends")
 

@@ -5,7 +5,7 @@ Updated with transitions in order of arrival; no clock, no bus, no drawing.
 
 from dataclasses import dataclass, field
 
-from rigwatch.wire.messages import PROBABLY_MISSING, Alarm, Event
+from rigwatch.wire.messages import PROBABLY_MISSING, Alarm, Event, remember
 
 LANES: dict[str, str] = {
     "departure": "departure from the model",
@@ -45,7 +45,7 @@ class AlarmBook:
     def record(self, alarm: Alarm) -> bool:
         """Apply one transition; true if it changes the alarm's state."""
         before = self.last.get(alarm.name)
-        self.last[alarm.name] = alarm
+        remember(self.last, alarm)
         if before is None or before.onset_seq != alarm.onset_seq:
             self.missing.pop(alarm.name, None)
         return before is None or before.state != alarm.state
@@ -54,7 +54,8 @@ class AlarmBook:
         """Record the result of the effect ranking from its event."""
         if event.code == PROBABLY_MISSING:
             name, _, text = event.text.partition(": ")
-            self.missing[name] = text
+            if name in self.last:
+                self.missing[name] = text
 
     def standing(self) -> list[Alarm]:
         """Alarms that are not normal, oldest first."""

@@ -18,6 +18,7 @@ from rigwatch.wire.bus.commands import (
     ask_for_model,
     command_alarms,
     command_mark,
+    marked,
     proved_here,
     serve_alarm_list,
 )
@@ -31,6 +32,7 @@ from rigwatch.wire.bus.connection import (
 )
 from rigwatch.wire.bus.inbox import Inbox
 from rigwatch.wire.bus.member import unique_process
+from rigwatch.wire.bus.message_ring import SAID_KEY
 from rigwatch.wire.bus.ring_questions import RingQuestions
 from rigwatch.wire.bus.subscription import MOST_COMMANDS, QUEUE_CAPACITY, Subscription
 from rigwatch.wire.bus.transport import DENIED_MARK, MAX_PAYLOAD, REFUSED_MARK, Close
@@ -43,6 +45,7 @@ __all__ = [
     "PATIENCE",
     "QUEUE_CAPACITY",
     "REFUSED_MARK",
+    "SAID_KEY",
     "Bus",
     "Close",
     "CommandCheck",
@@ -62,6 +65,7 @@ __all__ = [
     "connect",
     "joined",
     "log_refusals",
+    "marked",
     "open_router",
     "proved_here",
     "serve_alarm_list",

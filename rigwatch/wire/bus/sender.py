@@ -1,9 +1,17 @@
-"""A subscriber's state for one sender of numbered messages: order, owners, live runs."""
+"""A subscriber's state for one sender of numbered messages: order, owners, live runs.
+
+On the bus the end of a process's token may overtake what the process said just before. Messages of
+a run that has ended are therefore taken for a while, from its owner only and in their order.
+"""
+
+import time
 
 from rigwatch.wire.ordering import Ask, Numbered, Outcome, Owners, RingReply, SampleOrder
 
 MOST_WAITING = 16384
 """Messages that may wait behind a gap: minutes of estimates, which are most of them."""
+LATE = 10.0
+"""Time from the end of a run for which its messages are taken [s]: that of a silent link."""
 
 
 class Sender:
@@ -23,16 +31,13 @@ class Sender:
         )
         self._owners = Owners()
         self._alive: dict[int, int] = {}
-
-    @property
-    def alive(self) -> bool:
-        """Whether any run of the process is alive."""
-        return bool(self._alive)
+        self._ended: dict[int, float] = {}
 
     def appeared(self, run: int, since_ns: int, sender: str) -> list[Outcome[Numbered]]:
         """A run's token has appeared: messages sent during the interruption are also needed."""
         self._owners.appeared(run, since_ns, sender)
         self._alive[run] = since_ns
+        self._ended.pop(run, None)
         return [
             *self.order.on_token(run, since_ns, True),
             *self._follow(),
@@ -44,11 +49,12 @@ class Sender:
         self._owners.vanished(run, since_ns)
         if self._alive.get(run) == since_ns:
             del self._alive[run]
+            self._end(run)
         return [*self.order.on_token(run, since_ns, False), *self._follow()]
 
     def received(self, message: Numbered, sender: str) -> list[Outcome[Numbered]] | None:
-        """Process a message; None if `sender` does not own its run."""
-        if message.boot not in self._alive or not self._owners.admits(message.boot, sender):
+        """Process a message; None if `sender` does not own its run, or it has ended long ago."""
+        if not self._may_speak(message.boot) or not self._owners.admits(message.boot, sender):
             return None
         return self.order.on_block(message)
 
@@ -59,6 +65,15 @@ class Sender:
     def silent(self) -> list[Outcome[Numbered]]:
         """Handle silence: lost messages at the end are not revealed by a successor."""
         return self.order.on_silence() if self._alive else []
+
+    def _may_speak(self, run: int) -> bool:
+        ended = self._ended.get(run)
+        return run in self._alive or (ended is not None and time.monotonic() - ended < LATE)
+
+    def _end(self, run: int) -> None:
+        now = time.monotonic()
+        self._ended = {one: at for one, at in self._ended.items() if now - at < LATE}
+        self._ended[run] = now
 
     def _follow(self) -> list[Outcome[Numbered]]:
         """Follow a new run of the process from its first message on."""

@@ -6,8 +6,16 @@
 The logic is in `ordering`, which is also used for alarms and estimates.
 """
 
-from rigwatch.wire.delivery.ring import SampleRing
+from rigwatch.wire.delivery.ring import SOURCE_KEY, SampleRing
 from rigwatch.wire.delivery.sample_reader import Item, SampleReader
 from rigwatch.wire.ordering import LARGEST_SEQ, POSITION_WRONG, Counters
 
-__all__ = ["LARGEST_SEQ", "POSITION_WRONG", "Counters", "Item", "SampleReader", "SampleRing"]
+__all__ = [
+    "LARGEST_SEQ",
+    "POSITION_WRONG",
+    "SOURCE_KEY",
+    "Counters",
+    "Item",
+    "SampleReader",
+    "SampleRing",
+]

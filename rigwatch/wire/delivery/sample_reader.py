@@ -93,7 +93,7 @@ class SampleReader:
         self._bus, self._publish_gaps = bus, publish_gaps
         self._order: SampleOrder[SampleBlock] = SampleOrder(resume_after, history, patient=patient)
         self._owners = Owners()
-        self._refused_boot: int | None = None
+        self._refused: tuple[int, str] | None = None
         self._impostor_at: float | None = None
         self._assumed: int | None = None
         self._inbox: Inbox[_Incoming] = Inbox(capacity)
@@ -222,26 +222,27 @@ class SampleReader:
 
     def _take_block(self, block: SampleBlock, sender: str) -> None:
         if not self._owners.admits(block.boot, sender):
-            self._refuse(block)
+            self._refuse(block, sender)
             return
-        self._notice_impostor(block.boot)
+        self._notice_impostor(block.boot, sender)
         self.heard = True
         self._heard_at = self._silence_told_at = time.monotonic()
         self._handle(self._order.on_block(block))
 
-    def _refuse(self, block: SampleBlock) -> None:
+    def _refuse(self, block: SampleBlock, sender: str) -> None:
         """Refuse samples of a boot that another process owns."""
         self.counters.foreign += len(block)
-        self._refused_boot = block.boot
+        self._refused = block.boot, sender
 
-    def _notice_impostor(self, boot: int) -> None:
+    def _notice_impostor(self, boot: int, owner: str) -> None:
         """The owner still sends after foreign samples were refused: report the second sender."""
-        if self._refused_boot != boot:
+        # One whose samples came before its token is the owner by now.
+        if self._refused is None or self._refused[0] != boot or self._refused[1] == owner:
             return
         if not self.contested:
             text = f"another process sends samples as boot {boot}; they are dropped"
             self._report_event(Remark("error", "DUPLICATE SOURCE", text))
-        self._refused_boot, self._impostor_at = None, time.monotonic()
+        self._refused, self._impostor_at = None, time.monotonic()
 
     def _check_silence(self) -> None:
         now = time.monotonic()

@@ -3,6 +3,8 @@
 import os
 from pathlib import Path
 
+from rigwatch.wire.new_file import part_of, remove_left_behind
+
 
 def write_through(path: Path, text: str) -> None:
     """Write a text file and return once it is on the disk."""
@@ -23,13 +25,17 @@ def replace_file(
         mode: permissions of the file, limited by the process's umask.
         durable: return only once the file is on the disk.
     """
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
-    part.unlink(missing_ok=True)
+    part = part_of(path)
+    remove_left_behind(path)
     # Created here with its final permissions, so that a secret is never readable by others.
     handle = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
-    with os.fdopen(handle, "wb") as file:
-        file.write(content.encode() if isinstance(content, str) else content)
-        if durable:
-            file.flush()
-            os.fsync(file.fileno())
-    part.replace(path)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content.encode() if isinstance(content, str) else content)
+            if durable:
+                file.flush()
+                os.fsync(file.fileno())
+        part.replace(path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise

@@ -44,6 +44,7 @@ from rigwatch.wire.messages.message_types import (
     SampleBlock,
     Severity,
 )
+from rigwatch.wire.messages.newest_alarms import MOST_ALARMS, remember
 from rigwatch.wire.messages.packed import decode_block
 from rigwatch.wire.messages.quality_flags import (
     NON_FINITE,
@@ -87,6 +88,7 @@ __all__ = [
     "LONGEST_TEXT",
     "MODELS",
     "MONITOR_STALE",
+    "MOST_ALARMS",
     "NON_FINITE",
     "NOT_PROVED",
     "PAST_KEY",
@@ -134,6 +136,7 @@ __all__ = [
     "pieces",
     "protobuf_schema",
     "quality_flags",
+    "remember",
     "topic",
     "topic_of",
     "unseen",

@@ -28,6 +28,7 @@ class FileOutput:
         except OSError as error:
             raise SessionError(f"{path}: cannot be written: {reason_of(error)}") from error
         self.closed = False
+        self._had_name = self._has_name()
 
     @property
     def waiting(self) -> int:
@@ -50,8 +51,10 @@ class FileOutput:
         """Write the waiting bytes to the disk.
 
         Raises:
-            SessionError: they cannot be written; the file is as before.
+            SessionError: they cannot be written, or somebody has removed the file; it is as before.
         """
+        if self._had_name and not self._has_name():
+            raise SessionError(f"{self._path}: cannot be written: it has been removed")
         try:
             self._write_all()
         except OSError as error:
@@ -67,6 +70,10 @@ class FileOutput:
             os.fsync(self._descriptor)
         self.committed += done
         self._bytes.clear()
+
+    def _has_name(self) -> bool:
+        """Whether it is in a folder: what is written to a removed file is lost without an error."""
+        return os.fstat(self._descriptor).st_nlink > 0
 
     def _roll_back(self) -> None:
         """Remove a partly written chunk, as its messages will be in the next segment."""

@@ -1,4 +1,4 @@
-// Talks to the server: JSON, signals, and what it tells by itself.
+// Asks the server: JSON and signals.
 
 export class Refused extends Error {}
 
@@ -35,20 +35,4 @@ export async function signals(path, signal) {
     return { name, count, x: times[head.shared ? 0 : k], y: y.some(Number.isNaN) ? Array.from(y, (v) => (Number.isNaN(v) ? null : v)) : y };
   });
   return { ends: head.ends, lines };
-}
-
-/** Server-sent events for as long as the page is looked at: a browser has few connections. */
-export function listen(path, heard, kinds = ["job", "study"]) {
-  let source = null;
-  const open = () => {
-    if (source || document.hidden) return;
-    source = new EventSource(path);
-    for (const kind of kinds) source.addEventListener(kind, (event) => heard(kind, JSON.parse(event.data)));
-  };
-  const close = () => { source?.close(); source = null; };
-  document.addEventListener("visibilitychange", () => {
-    if (document.hidden) close(); else { open(); heard(kinds.at(-1), {}); }
-  });
-  addEventListener("pagehide", close);
-  open();
 }

@@ -1,5 +1,5 @@
 /* The live page of many rigs: takes the parts that the server sends, and keeps the focus. */
-"use strict";
+import { listen } from "./stream.js";
 
 const byId = (id) => document.getElementById(id);
 
@@ -26,21 +26,15 @@ function say(id, words) {
   if (byId(id).textContent !== words) byId(id).textContent = words;
 }
 
-const events = new EventSource("/events");
-events.addEventListener("rigs", (event) => {
-  const { summary, html } = JSON.parse(event.data);
+function heard(_, { summary, html }) {
   say("summary", summary);
   document.title = summary;
   show(html);
-  say("link", "live");
-  byId("link").className = "";
   document.body.dataset.count = String(Number(document.body.dataset.count ?? 0) + 1);
-});
-events.addEventListener("old", (event) => {
-  say("link", `no look at the rigs for ${JSON.parse(event.data).seconds} s: the figures are old`);
-  byId("link").className = "no";
-});
-events.addEventListener("error", () => {
-  say("link", `not connected since ${new Date().toLocaleTimeString()}: the figures are old`);
-  byId("link").className = "no";
-});
+}
+
+function told(words) {
+  say("link", words || "live");
+  byId("link").className = words ? "no" : "";
+}
+listen("/events", { kinds: ["rigs"], heard, told });

@@ -2,6 +2,7 @@
 import { get, post } from "./api.js";
 import { $, attempt, keysOn, remark, say, showHelp } from "./common.js";
 import { cursor, label } from "./cursor.js";
+import { listen } from "./stream.js";
 
 const charts = {};
 const kept = { samples: { times: [], lines: {} }, estimates: { times: [], lines: {} } };
@@ -10,6 +11,7 @@ let units = {};
 let shown = "";
 let paused = false;
 let status = null;
+let old = ""; // why the figures are old
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 const plain = (words) => words.replaceAll("_", " ");
 const ESTIMATES = { theta1: "Coulomb θ1", theta2: "viscous θ2" };
@@ -158,9 +160,9 @@ async function openStudy(name) {
 
 function states() {
   const { trouble, armed, why, processes } = status;
-  const words = trouble ? "absent" : armed && !why ? "watching" : armed ? `watching, but ${why}` : `not armed: ${why}`;
+  const words = old ? old : trouble ? "absent" : armed && !why ? "watching" : armed ? `watching, but ${why}` : `not armed: ${why}`;
   if ($("link").textContent !== words) $("link").textContent = words;
-  $("link").dataset.armed = trouble ? "absent" : armed ? "yes" : "no";
+  $("link").dataset.armed = trouble || old ? "absent" : armed ? "yes" : "no";
   $("absent").hidden = !trouble;
   $("absent-why").textContent = trouble;
   $("processes").tBodies[0].replaceChildren(...processes.map((one) => element("tr", "", {}, element("th", one.name, { scope: "row" }), element("td", one.state), element("td", one.text))));
@@ -191,22 +193,18 @@ async function rollback() {
   await history();
 }
 
-let source = null;
-function open() {
-  if (source || document.hidden) return;
-  source = new EventSource("/api/rig/events");
-  source.addEventListener("signals", (event) => {
-    const found = JSON.parse(event.data);
-    ({ units, seconds } = found);
-    for (const kind of Object.keys(kept)) take(kind, found.signals[kind]);
-    if (!paused) draw();
-  });
-  source.addEventListener("status", (event) => { status = JSON.parse(event.data); states(); alarms(status.alarms); });
-  source.addEventListener("error", () => { $("link").textContent = "the server does not answer; trying again"; });
+function heard(kind, content) {
+  if (kind === "status") { status = content; states(); alarms(status.alarms); return; }
+  ({ units, seconds } = content);
+  for (const one of Object.keys(kept)) take(one, content.signals[one]);
+  if (!paused) draw();
 }
-function close() { source?.close(); source = null; }
-document.addEventListener("visibilitychange", () => { if (document.hidden) close(); else { open(); history(); } });
-addEventListener("pagehide", close);
+
+/** Whether the monitor watches is not known while the page's figures are old. */
+function outdated(words) {
+  old = words;
+  if (status) states(); else $("link").textContent = words;
+}
 $("pause").addEventListener("click", () => pause(!paused));
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || !keysOn() || event.target.closest("input, select, textarea")) return;
@@ -218,4 +216,4 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   draw();
 });
 addEventListener("resize", () => { for (const { plot, box } of Object.values(charts)) plot.setSize({ width: box.clientWidth, height: 124 }); });
-addEventListener("load", () => { open(); history(); });
+addEventListener("load", () => { listen("/api/rig/events", { kinds: ["signals", "status"], heard, again: history, told: outdated }); history(); });

@@ -1,6 +1,7 @@
 // The list of studies: running tasks, changes made elsewhere; stories are begun from here.
-import { listen, post } from "./api.js";
+import { post } from "./api.js";
 import { $, advance, attempt, keysOn, say, showHelp } from "./common.js";
+import { listen } from "./stream.js";
 
 let jobs = {};
 
@@ -30,14 +31,14 @@ async function refresh() {
   show();
 }
 
-listen("/api/studies/events", (kind, content) => {
-  if (kind === "jobs") {
-    const ended = Object.keys(jobs).filter((name) => !(name in content));
-    jobs = content;
-    show();
-    if (ended.length) say(ended.map((name) => `${name}: task ended`).join(", "));
-  } else if (kind === "studies") refresh();
-}, ["jobs", "studies"]);
+function heard(kind, content) {
+  if (kind === "studies") { refresh(); return; }
+  const ended = Object.keys(jobs).filter((name) => !(name in content));
+  jobs = content;
+  show();
+  if (ended.length) say(ended.map((name) => `${name}: task ended`).join(", "));
+}
+listen("/api/studies/events", { kinds: ["jobs", "studies"], heard, again: refresh });
 
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || !keysOn() || event.target.closest("input, select, textarea")) return;

@@ -1,10 +1,11 @@
 // The page of a study: parts from the server, charts, candidates, places, keys.
-import { get, post, listen } from "./api.js";
+import { get, post } from "./api.js";
 import { $, advance, attempt, keysOn, remark, say, showHelp } from "./common.js";
 import { Charts } from "./charts.js";
 import { cursor } from "./cursor.js";
 import { exportable } from "./figures.js";
 import { numbers } from "./numbers.js";
+import { listen } from "./stream.js";
 
 const name = document.querySelector("[data-study]").dataset.study;
 const path = name.split("/").map(encodeURIComponent).join("/");
@@ -380,12 +381,13 @@ function cells(event) {
 }
 
 // What had ended before this page was opened is no news.
-let heard = false;
-listen(`/api/events/${path}`, (kind, content) => {
-  if (kind === "job") heardJob(content, heard || content?.number === asked);
-  if (kind === "job") heard = true;
-  if (kind === "study") refresh();
-});
+let told = false;
+function heard(kind, content) {
+  if (kind === "study") { refresh(); return; }
+  heardJob(content, told || content?.number === asked);
+  told = true;
+}
+listen(`/api/events/${path}`, { kinds: ["job", "study"], heard, again: refresh });
 
 function begin() {
   channels();

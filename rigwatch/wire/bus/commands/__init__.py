@@ -10,6 +10,7 @@ from rigwatch.wire.bus.commands.command_check import (
 )
 from rigwatch.wire.bus.commands.model_change import KEY, PATIENCE, ask_for_model
 from rigwatch.wire.bus.commands.model_request import ModelReply, ModelRequest
+from rigwatch.wire.bus.commands.refusal import marked
 
 __all__ = [
     "KEY",
@@ -22,6 +23,7 @@ __all__ = [
     "ask_for_model",
     "command_alarms",
     "command_mark",
+    "marked",
     "proved_here",
     "serve_alarm_list",
 ]

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.bus.commands.alarm_list import ask_alarm_list
 from rigwatch.wire.bus.commands.command_check import signed
+from rigwatch.wire.bus.commands.refusal import refusal_of
 from rigwatch.wire.bus.subscription import Subscription
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.messages import ALARMS, COMMANDS, EVENTS, Alarm, AlarmCommand
@@ -55,7 +56,8 @@ def _answer_to(
     bus: Bus, command: AlarmCommand, changes: Subscription, events: Subscription
 ) -> _Answer:
     _wait_for_monitor(bus)
-    bus.publish(COMMANDS, signed(bus, command))
+    sent = signed(bus, command)
+    bus.publish(COMMANDS, sent)
     answer = _Answer()
     deadline = time.monotonic() + TIMEOUT / 2
     while time.monotonic() < deadline and not answer.refusal:
@@ -63,8 +65,7 @@ def _answer_to(
         if alarm is not None and alarm.user == command.user:
             answer.changed.append(alarm)
             deadline = min(deadline, time.monotonic() + SETTLE)
-        said = [event for event in events.drain() if event.code == "alarm_command_refused"]
-        answer.refusal = said[0].text if said else ""
+        answer.refusal = refusal_of(sent, events.drain())
         answer.interrupted |= not bus.connected()
     return answer
 
