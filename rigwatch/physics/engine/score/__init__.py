@@ -16,7 +16,14 @@ from rigwatch.physics.engine.score.candidates import (
 from rigwatch.physics.engine.score.compatibility import has_variables, possible, suits
 from rigwatch.physics.engine.score.effect_sensitivities import directions, trajectory
 from rigwatch.physics.engine.score.ranking import Standing, cosines_with, freed, standings
-from rigwatch.physics.engine.score.score_test import ALIKE, Projector, Scores, best_of, score
+from rigwatch.physics.engine.score.score_test import (
+    ALIKE,
+    Projector,
+    Scores,
+    alone,
+    best_of,
+    score,
+)
 from rigwatch.physics.engine.score.significance import corrected_p_values
 
 __all__ = [
@@ -25,6 +32,7 @@ __all__ = [
     "Projector",
     "Scores",
     "Standing",
+    "alone",
     "autocorrelation",
     "best_of",
     "candidates",
