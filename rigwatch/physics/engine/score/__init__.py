@@ -5,7 +5,11 @@ the outputs, `score_test` the share of the residual that each explains, `signifi
 the number of candidates, `ranking` selects the best shapes and forms classes of similar effects.
 """
 
-from rigwatch.physics.engine.score.autocorrelation import autocorrelation, first_below
+from rigwatch.physics.engine.score.autocorrelation import (
+    autocorrelation,
+    correlation_time,
+    first_below,
+)
 from rigwatch.physics.engine.score.candidates import (
     Candidate,
     candidates,
@@ -37,6 +41,7 @@ __all__ = [
     "best_of",
     "candidates",
     "corrected_p_values",
+    "correlation_time",
     "cosines_with",
     "directions",
     "first_below",
