@@ -71,12 +71,12 @@ def scoring(data: Data, repeats: int) -> Row:
     bench = opened(data)
     base, found = bench.base, candidates(bench.study, data.train)[:CANDIDATES]
     taken: dict[str, list[float]] = {"scores": [], "p-values": []}
-    residual = np.nan_to_num(base.train.residuals / base.train.scale).ravel()
+    residual = base.train.residuals / base.train.scale
     for _ in range(repeats + 1):
         begin = time.perf_counter()
         scores = score_all(data, base, found)
         middle = time.perf_counter()
-        corrected_p_values(scores, residual, len(base.train.residuals))
+        corrected_p_values(scores, residual)
         taken["scores"].append(middle - begin)
         taken["p-values"].append(time.perf_counter() - middle)
     phases = {name: statistics.median(seconds[1:]) for name, seconds in taken.items()}

@@ -109,7 +109,7 @@ def suspects(evidence: Evidence, model: RigModel, effects: Mapping[str, Effect])
     scores = score(
         residual[None], moved[rows][None] / scale, Projector(nothing, nothing), variance=1.0
     )
-    p_values = corrected_p_values(scores, residual, 1)
+    p_values = corrected_p_values(scores, residual[None, :, None])
     allowed = _allowed(ports, found, scores, pushes[rows])
     ranked = standings([c.label for c in found], scores, p_values, allowed)
     return _named([(_suspect(found[s.index], s), s.index) for s in ranked], residual, scores.units)

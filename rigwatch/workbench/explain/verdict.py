@@ -44,6 +44,8 @@ NEARLY = 0.8
 """Share of the best effect's gain above which another effect may be the right one."""
 CONTRADICTED = 2.0
 """Ratio of the training energy explained by another effect above which the best is in doubt."""
+CHANCE = 0.05
+"""p-value of the best effect from which coloured noise explains the error as well."""
 MOST_OF_IT = 0.75
 """Share of the best effect's gain that an effect of lower order needs to be named instead."""
 
@@ -290,7 +292,19 @@ def _nothing_found(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> V
     if fitted:
         nearest = min(fitted, key=lambda row: row.held_out_error)
         text += f"; nearest is {nearest.label}, refused: {nearest.reason}"
+    text += _like_noise(rows, floor)
     return Verdict("unknown_effect", None, (), (), text)
+
+
+def _like_noise(rows: Sequence[Ranked], floor: NoiseFloor) -> str:
+    """A remark where coloured noise alone could be all that is above the noise floor."""
+    best = min((row.p_value for row in rows), default=0.0)
+    if floor.method != "quiet band" or best < CHANCE:
+        return ""
+    return (
+        f"; it is no more like an effect than coloured noise is (p = {best:.1g}), and this floor"
+        " holds for white noise: a healthy recording, or one whose input repeats, would tell"
+    )
 
 
 def _named(base: Fitted, accepted: Sequence[Ranked], floor: NoiseFloor) -> Ranked:

@@ -20,6 +20,7 @@ from scipy.stats import t as student
 
 from rigwatch.physics.engine.equations import System
 from rigwatch.physics.engine.fit import Fit
+from rigwatch.physics.engine.score import autocorrelation, correlation_time
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.units import unit_of
 from rigwatch.workbench.fit.fitted import blocks
@@ -27,6 +28,8 @@ from rigwatch.workbench.fit.fitted import blocks
 CONFIDENCE = 0.95
 ENOUGH = 12
 """Number of windows above which each is a block of its own."""
+BLOCK_LENGTH, FEWEST = 2.0, 8
+"""Length of a block over the correlation time, and number of blocks that must be left."""
 PHASES = 20
 """Number of parts of one repetition, each a block."""
 TOLD = "told by the first samples of a held-out recording"
@@ -121,8 +124,9 @@ def block_numbers(fitted: Fit, repeat: int = 0) -> IntArray:
     """Number of the block that each row of the flattened error belongs to, shape (rows,).
 
     Windows are blocks if there are enough, as parts of a window share its initial state; few are
-    divided. If the excitation repeats, what a wrong model leaves repeats with it, and all samples
-    of the same part of a repetition are one block.
+    divided, and those that are shorter than the error is correlated are joined. If the excitation
+    repeats, what a wrong model leaves repeats with it, and all samples of the same part of a
+    repetition are one block.
 
     Args:
         fitted: the fit.
@@ -134,9 +138,28 @@ def block_numbers(fitted: Fit, repeat: int = 0) -> IntArray:
         phase = np.arange(samples) % repeat
         return np.repeat(phase * min(PHASES, repeat) // repeat, len(fitted.scale))
     if count >= ENOUGH:
-        return np.repeat(np.arange(count), rows)
-    lengths = [len(block) for block in blocks(fitted.error)]
-    return np.repeat(np.arange(len(lengths)), lengths)
+        lengths = [rows] * count
+    else:
+        lengths = [len(block) for block in blocks(fitted.error)]
+    together = _blocks_together(fitted, len(lengths))
+    return np.repeat(np.arange(len(lengths)) // together, lengths)
+
+
+def _blocks_together(fitted: Fit, count: int) -> int:
+    """How many of `count` blocks in a row are as long as twice what a parameter remembers.
+
+    The jackknife needs blocks that are nearly independent of each other. A parameter's share of
+    each sample, ∂error/∂θ·error, is correlated as long as both are.
+    """
+    windows, outputs = len(fitted.error), len(fitted.scale)
+    slopes = fitted.jacobian.reshape(windows, -1, outputs, fitted.jacobian.shape[-1])
+    error = fitted.error.reshape(windows, -1, outputs, 1)
+    shares = np.sum(slopes * error, axis=2).reshape(1, -1, slopes.shape[3])
+    samples = shares.shape[1]
+    correlation = autocorrelation(shares, max(samples // FEWEST, 1))
+    longest = max((correlation_time(each) for each in correlation.T), default=1.0)
+    needed = BLOCK_LENGTH * longest * count / samples
+    return int(np.clip(np.ceil(needed), 1, max(count // FEWEST, 1)))
 
 
 def values(fitted: Fit, added_variances: Mapping[str, float] | None = None) -> dict[str, Value]:

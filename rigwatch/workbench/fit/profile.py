@@ -3,17 +3,18 @@
 A parameter is fixed away from its optimum, the others are refitted, and the interval ends when the
 squared error has risen by more than chance allows,
 
-    Δ(Σ r²) = χ²(95 %, 1) · s² · swelling
+    Δ(Σ r²) = t²(97.5 %) · s² · swelling
 
 (D. Bates, D. Watts, Nonlinear Regression Analysis, 1988). The swelling is the ratio of the
-jackknife's variance (`intervals.py`) to the textbook's, so residuals may be autocorrelated.
+jackknife's variance (`intervals.py`) to the textbook's, so residuals may be autocorrelated, and
+Student's t has the degrees of freedom of that variance.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 from msgspec.structs import replace as changed
-from scipy.stats import chi2
+from scipy.stats import t as student
 
 from rigwatch.physics.engine.compile import CompiledSystem
 from rigwatch.physics.engine.fit import Fit, Recording, fit
@@ -46,7 +47,7 @@ def profile(fitted: Fitted, recording: Recording) -> dict[str, Value]:
         recording: the recording it was fitted to.
     """
     found, train = values(fitted.train), fitted.train
-    robust, _ = covariance(train)
+    robust, degrees = covariance(train)
     for index, name in enumerate(train.compiled.system.free):
         if found[name].note:
             continue
@@ -54,9 +55,10 @@ def profile(fitted: Fitted, recording: Recording) -> dict[str, Value]:
         swelling = robust[index, index] / max(train.covariance[index, index], 1e-300)
         best = float(np.sum(train.error**2))
         used = max(train.error.size - train.jacobian.shape[-1] - train.initial.size, 1)
-        allowed = float(chi2.ppf(CONFIDENCE, 1) * best / used * swelling)
+        deviations = float(student.ppf(0.5 + CONFIDENCE / 2, degrees[index]))
+        allowed = deviations**2 * best / used * swelling
         search = _Search(train, recording, fitted.horizon, fitted.substeps, allowed, best)
-        ends = [_end(search, name, sign * 1.96 * width) for sign in (-1, 1)]
+        ends = [_end(search, name, sign * deviations * width) for sign in (-1, 1)]
         found[name] = replace(found[name], interval=(ends[0], ends[1]))
     return found
 

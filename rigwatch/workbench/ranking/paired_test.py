@@ -18,11 +18,9 @@ import numpy as np
 from scipy.stats import norm
 
 from rigwatch.physics.engine.fit import Fit
-from rigwatch.physics.engine.score import autocorrelation, first_below
+from rigwatch.physics.engine.score import autocorrelation, correlation_time
 from rigwatch.wire.arrays import FloatArray
 
-UNCORRELATED = 0.1
-"""Autocorrelation below which samples count as uncorrelated."""
 BLOCK_LENGTH = 2.0
 """Block length over the correlation time."""
 MIN_BLOCKS = 8
@@ -83,9 +81,7 @@ def _correlation_time(one: FloatArray, other: FloatArray) -> float:
     apart = one - other
     share = np.sum(one * apart) / max(float(np.sum(apart**2)), 1e-300)
     product_ = np.sum((one - share * apart) * apart, axis=1)
-    correlation = autocorrelation(product_, max(len(product_) // MIN_BLOCKS, 1))
-    last = first_below(correlation, UNCORRELATED)
-    return float(1 + 2 * np.sum(correlation[1:last]))
+    return correlation_time(autocorrelation(product_, max(len(product_) // MIN_BLOCKS, 1)))
 
 
 def _p_value(blocks: FloatArray) -> float:

@@ -1,8 +1,8 @@
 """Ranks every effect at every port: scored along the fitted model, the best fitted and judged.
 
 The score test compares the residual with all candidates' directions at once, after projecting out
-the parameters already fitted. Its p-value allows for autocorrelated residuals, which a wrong model
-produces, and is corrected for the number of candidates. The best candidates are then fitted in
+the parameters already fitted. Its p-value allows for noise of any colour and for what a wrong model
+leaves, and is corrected for the number of candidates. The best candidates are then fitted in
 full. An effect is accepted only if the held-out error falls, over blocks, by more than chance.
 """
 
@@ -108,17 +108,18 @@ def _elsewhere(study: Study, data: Data, rows: Sequence[Ranked], floor: NoiseFlo
 def _simpler_or_equal(
     study: Study, data: Data, rows: Sequence[Ranked], floor: NoiseFloor
 ) -> list[Ranked]:
-    """Unfitted significant rows at the best's port, no less simple, if it leaves more than noise.
+    """Unfitted rows at the best's port, no less simple, if it leaves more than noise.
 
     A score is to first order in the strength: in a model that is far from linear, as a jet at a
-    nearly empty tank, what a sensor's zero does to it is underrated.
+    nearly empty tank, what a sensor's zero does to it is underrated. Few are asked here, so each
+    counts that is significant by itself.
     """
     best, left = _best_and_what_it_leaves(study, data, rows, floor)
     # A short recording excuses what is left, but a rival that leaves less must be tried.
     if best is None or left <= floor.usual:
         return []
     waiting = [r for r in rows if r.fitted is None and not r.failure and not r.fitted_instead]
-    likely = [r for r in waiting if r.port == best.port and r.p_value < LEVEL]
+    likely = [r for r in waiting if r.port == best.port and r.p_alone < LEVEL]
     return sorted((r for r in likely if r.free <= best.free), key=lambda r: r.p_value)[:MOST_MORE]
 
 

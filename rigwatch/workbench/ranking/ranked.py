@@ -24,6 +24,7 @@ class Ranked:
         placement: the effect and its port.
         kind: of the port: force, actuator or sensor.
         p_value: of the score, corrected for the number of candidates.
+        p_alone: the same without this correction.
         explained: share of the training residual's energy that it explains to first order.
         start: initial values of its fit, by the effect's own parameter names.
         alike: effects whose directions on this recording are nearly parallel, as "effect@port".
@@ -52,6 +53,7 @@ class Ranked:
     reason: str = "not like the residual"
     failure: str = ""
     fitted_instead: str = ""
+    p_alone: float = 1.0
 
     @property
     def effect(self) -> str:

@@ -9,6 +9,7 @@ from rigwatch.physics.engine.score import (
     Candidate,
     Projector,
     Scores,
+    alone,
     corrected_p_values,
     directions,
     possible,
@@ -86,12 +87,14 @@ def scored(
         every: include effects whose strength would be outside its bounds.
     """
     scores = score_all(data, base, found)
-    residual = np.nan_to_num(base.train.residuals / base.train.scale).ravel()
-    p_values = corrected_p_values(scores, residual, len(base.train.residuals))
+    p_values = corrected_p_values(scores, base.train.residuals / base.train.scale)
     strengths = scores.strength.tolist()
     allowed = [every or possible(c, at) for c, at in zip(found, strengths, strict=True)]
     ports = study.model.ports
-    return [
+    rows = [
         row_of(found[row.index], row, ports[found[row.index].port].kind)
         for row in standings([c.label for c in found], scores, p_values, allowed)
     ]
+    for row in rows:
+        row.p_alone = alone(row.p_value, int(np.sum(scores.score > 0)))
+    return rows

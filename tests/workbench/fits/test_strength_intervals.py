@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from rigwatch.physics.engine.equations import Placement
 from rigwatch.physics.engine.equations.effect_files import library
@@ -159,6 +160,19 @@ def test_a_parameter_that_shows_in_few_windows_has_the_interval_of_few_degrees_o
     # With the 19 degrees of freedom of 20 blocks it would be nine tenths or less.
     assert 0.93 <= np.mean(hits) <= 0.99
     assert covariance(left)[1][0] < 4
+
+
+def test_errors_that_last_longer_than_a_block_do_not_narrow_an_interval() -> None:
+    fitted = found_in(0)[0]
+    random = np.random.default_rng(5)
+    slow = np.sin(np.arange(1000) / 60).reshape(4, 250, 1)
+    hits = []
+    for _ in range(200):
+        noise = lfilter([1.0], [1.0, -0.98], random.normal(size=1500))[500:].reshape(4, 250)
+        moved = float(np.sum(slow[..., 0] * noise) / np.sum(slow**2))
+        left = replace(fitted, error=noise - moved * slow[..., 0], jacobian=slow)
+        hits.append(abs(moved) <= half_width(values(left)[STRENGTH]) * left.values()[STRENGTH])
+    assert np.mean(hits) >= 0.9
 
 
 def test_chance_is_no_difference_between_regimes() -> None:

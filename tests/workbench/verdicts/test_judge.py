@@ -98,6 +98,18 @@ def test_what_no_effect_lowers_is_unknown() -> None:
     assert found == Verdict("unknown_effect", None, (), (), text)
 
 
+def test_what_coloured_noise_may_be_is_said() -> None:
+    rows = [row("a@x", fitted=False), row("b@x", fitted=False)]
+    for each, p_value in zip(rows, (0.3, 0.8), strict=True):
+        each.p_value = p_value
+    found = judge(base(2.0), rows, QUIET)
+    assert found.word == "unknown_effect"
+    assert "no more like an effect than coloured noise is (p = 0.3)" in found.text
+    assert "coloured" not in judge(base(2.0), rows, PERIODS).text
+    rows[1].p_value = 0.01
+    assert "coloured" not in judge(base(2.0), rows, QUIET).text
+
+
 def ended(converged: bool, undetermined: tuple[str, ...] = ()) -> Convergence:
     return Convergence(converged, 0.0, 1, 1, undetermined, (), "start", "stuck")
 

@@ -5,7 +5,11 @@ the outputs, `score_test` the share of the residual that each explains, `signifi
 the number of candidates, `ranking` selects the best shapes and forms classes of similar effects.
 """
 
-from rigwatch.physics.engine.score.autocorrelation import autocorrelation, first_below
+from rigwatch.physics.engine.score.autocorrelation import (
+    autocorrelation,
+    correlation_time,
+    first_below,
+)
 from rigwatch.physics.engine.score.candidates import (
     Candidate,
     candidates,
@@ -16,7 +20,14 @@ from rigwatch.physics.engine.score.candidates import (
 from rigwatch.physics.engine.score.compatibility import has_variables, possible, suits
 from rigwatch.physics.engine.score.effect_sensitivities import directions, trajectory
 from rigwatch.physics.engine.score.ranking import Standing, cosines_with, freed, standings
-from rigwatch.physics.engine.score.score_test import ALIKE, Projector, Scores, best_of, score
+from rigwatch.physics.engine.score.score_test import (
+    ALIKE,
+    Projector,
+    Scores,
+    alone,
+    best_of,
+    score,
+)
 from rigwatch.physics.engine.score.significance import corrected_p_values
 
 __all__ = [
@@ -25,10 +36,12 @@ __all__ = [
     "Projector",
     "Scores",
     "Standing",
+    "alone",
     "autocorrelation",
     "best_of",
     "candidates",
     "corrected_p_values",
+    "correlation_time",
     "cosines_with",
     "directions",
     "first_below",

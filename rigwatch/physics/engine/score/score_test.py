@@ -33,6 +33,7 @@ class Scores:
         explained: share of the residual's energy, shape (k,).
         cosines: between projected directions, absolute, shape (k, k).
         units: the projected directions, of unit length, shape (windows·samples, k).
+        fitted: the projector of everything already fitted.
     """
 
     score: FloatArray
@@ -42,6 +43,7 @@ class Scores:
     explained: FloatArray
     cosines: FloatArray
     units: FloatArray
+    fitted: "Projector"
 
 
 class Projector:
@@ -50,9 +52,13 @@ class Projector:
     Args:
         by_parameter: scaled sensitivities by parameters, shape (windows, k, m).
         by_start: sensitivities by each window's own initial states, shape (windows, k, n).
+
+    Attributes:
+        windows: their number.
     """
 
     def __init__(self, by_parameter: FloatArray, by_start: FloatArray) -> None:
+        self.windows = len(by_start)
         self._starts = np.linalg.qr(by_start).Q
         clean = self._without_starts(by_parameter)
         self._parameters = np.linalg.qr(np.concatenate(clean)).Q
@@ -67,9 +73,14 @@ class Projector:
         return np.asarray(flat - self._parameters @ (self._parameters.T @ flat))
 
 
-def best_of(alone: FloatArray, count: int) -> FloatArray:
+def best_of(single: FloatArray, count: int) -> FloatArray:
     """p-values of the best of `count` candidates from their single p-values (Šidák)."""
-    return np.asarray(-np.expm1(max(count, 1) * np.log1p(-np.minimum(alone, 1 - 1e-16))))
+    return np.asarray(-np.expm1(max(count, 1) * np.log1p(-np.minimum(single, 1 - 1e-16))))
+
+
+def alone(best: float, count: int) -> float:
+    """p-value of a single candidate from that of the best of `count` candidates."""
+    return float(-np.expm1(np.log1p(-min(best, 1 - 1e-16)) / max(count, 1)))
 
 
 def score(
@@ -89,13 +100,14 @@ def score(
     size = np.sqrt(np.where(seen, energy, 1.0))
     unit = np.where(seen, left / size, 0.0)
     along = unit.T @ r
-    alone = chi2.sf(along**2 / variance, 1)
+    single = chi2.sf(along**2 / variance, 1)
     return Scores(
         along**2 / variance,
-        alone,
-        best_of(alone, int(seen.sum())),
+        single,
+        best_of(single, int(seen.sum())),
         along / size,
         along**2 / max(float(r @ r), 1e-300),
         np.abs(unit.T @ unit),
         unit,
+        fitted,
     )
