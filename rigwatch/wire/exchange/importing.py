@@ -94,8 +94,11 @@ def _time_base(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[s
         return _TimeBase(grid, stamps), stamps.remarks
     shortest, longest = grid.steps_s
     holes = int(np.count_nonzero(grid.in_hole))
+    span = f"{shortest * 1e3:.3g} to {longest * 1e3:.3g} ms"
+    if shortest >= 1:
+        span = f"{shortest:.3g} to {longest:.3g} s"
     remark = (
-        f"time stamps in steps of {shortest * 1e3:.3g} to {longest * 1e3:.3g} ms: "
+        f"time stamps in steps of {span}: "
         f"{len(times)} samples resampled to {len(grid.times)} at {grid.rate_hz:g} Hz"
     )
     return _TimeBase(grid, stamps), (

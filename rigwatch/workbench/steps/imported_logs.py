@@ -92,7 +92,9 @@ def imported(
             continue
         table = read_table(path, logs.mapping)
         try:
-            found = matched(table.names, model, logs.mapping.channels, logs.mapping.time)
+            dated = [name for name in table.names if table.states_time(name)]
+            given, counted = logs.mapping.channels, logs.mapping.rate is not None
+            found = matched(table.names, model, given, logs.mapping.time, dated, counted=counted)
         except ModelError as error:
             raise ModelError(f"{path}: {error}") from None
         # A log of a real machine has gaps: missing values are invalid samples, not errors.
