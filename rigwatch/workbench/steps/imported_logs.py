@@ -103,6 +103,7 @@ def imported(
             logs.mapping,
             channels=found.channels,
             time=found.time,
+            held=_held(model),
             flag_missing=True,
             any_unit=True,
         )
@@ -112,6 +113,11 @@ def imported(
         remarks += [(path.name, remark) for remark in told]
         reading = reading or found
     return reading or Matched({}, "", {}, ()), _each_once(remarks), stated
+
+
+def _held(model: Model) -> tuple[str, ...]:
+    """Channels of inputs that the model file calls held from sample to sample."""
+    return tuple(o.channel or n for n, o in model.inputs.items() if model.held(n) == "zero")
 
 
 def _each_once(remarks: list[tuple[str, str]]) -> list[str]:
