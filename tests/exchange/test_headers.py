@@ -2,7 +2,7 @@
 
 import pytest
 
-from rigwatch.wire.exchange import read_header
+from rigwatch.wire.texts import read_header
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rigwatch.wire.errors import ImportDataError
-from rigwatch.wire.exchange.headers import read_header
 from rigwatch.wire.exchange.mapping import ImportMapping
 from rigwatch.wire.exchange.table_files import read_table
+from rigwatch.wire.texts import read_header
 from rigwatch.wire.units import unit_of
 
 

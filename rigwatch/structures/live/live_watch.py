@@ -118,7 +118,8 @@ class LiveDamage:
 
     def _messages(self) -> list[Said]:
         messages, rows, begin = list[Said](), list[FloatArray](), self._done
-        for row in range(self._done, len(self._record)):
+        settled = self._record.settled
+        for row in range(self._done, settled):
             if self._stage == "learning" and row + 1 == self._learnt:
                 messages += self._learn(row)
                 begin = row + 1
@@ -126,7 +127,7 @@ class LiveDamage:
                 residual, over = self._beside.step(self._record, row)
                 rows.append(residual)
                 messages += self._judged(row, over=over)
-        self._done = len(self._record)
+        self._done = max(self._done, settled)
         return [self._estimates(begin, rows), *messages] if rows else messages
 
     def _learn(self, row: int) -> list[Said]:

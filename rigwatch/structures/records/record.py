@@ -2,7 +2,8 @@
 
 A file is CSV with a header, or NPZ; the column `t` [s] is the time, equally spaced from 0 on, and
 the others are called after the signals they hold: x6, v6, a6 and the channels of recorded loads. An
-empty cell, NaN or infinity is a sample that is missing.
+empty cell, NaN or infinity is a sample that is missing. Where a load is, it is bridged, since the
+model cannot run without it, and what the signals say there is missing too.
 """
 
 import csv
@@ -19,6 +20,11 @@ from rigwatch.physics.engine.fit import Recording
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ImportDataError, ModelError, one_line
 from rigwatch.wire.new_file import new_file
+
+MOST_LOST = 0.2
+"""Largest share of a load's samples that may be missing."""
+LONGEST = 16
+"""Samples in a row that may be missing of a load for a line to stand for them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +46,8 @@ class Record:
         """The columns that belong to the model; NaN for an output that was not recorded.
 
         Raises:
-            ModelError: an input is missing or has gaps, or no output was recorded at all.
+            ModelError: an input is missing, at all or in too many samples, or no output was
+                recorded at all.
         """
         inputs = [self._input(i.channel or name, model.name) for name, i in model.inputs.items()]
         missing = np.full(len(self), np.nan)
@@ -52,16 +59,40 @@ class Record:
             )
         outputs = [self.columns.get(channel, missing) for channel in channels.values()]
         driven = np.stack(inputs, axis=1) if inputs else np.zeros((len(self), 0))
-        return Recording(self.dt, driven, np.stack(outputs, axis=1))
+        lost = np.asarray(~np.isfinite(driven).all(axis=1))
+        shown = np.where(lost[:, None], np.nan, np.stack(outputs, axis=1))
+        whole = [bridged(load) for load in driven.T]
+        return Recording(self.dt, np.stack(whole, axis=1) if whole else driven, shown)
 
     def _input(self, channel: str, model: str) -> FloatArray:
         if channel not in self.columns:
             found = ", ".join(self.columns)
             raise ModelError(f"{model}: found a record of {found}, expected its load {channel!r}")
         column = self.columns[channel]
-        if not np.isfinite(column).all():
-            raise ModelError(f"{model}: found gaps in the load {channel!r}, expected every sample")
+        share = float(np.mean(~np.isfinite(column)))
+        if share > MOST_LOST:
+            raise ModelError(
+                f"{model}: found {share:.0%} of the load {channel!r} missing, expected at most"
+                f" {MOST_LOST:.0%}"
+            )
         return column
+
+
+def bridged(load: FloatArray) -> FloatArray:
+    """A load (samples,) without gaps: lines across short ones, its last value across longer ones.
+
+    It is 0 as long as nothing is known of it.
+    """
+    rows, (known,) = np.arange(len(load)), np.nonzero(np.isfinite(load))
+    if len(known) == len(load) or not len(known):
+        return load if len(known) else np.zeros(len(load))
+    at = np.searchsorted(known, rows, side="right") - 1
+    before = np.where(at < 0, -1, known[at])
+    after = np.append(known, len(load) + LONGEST)[at + 1]
+    last = np.where(before < 0, 0.0, load[before])
+    line = np.interp(rows, known, load[known])
+    short = (after - before <= LONGEST + 1) | np.isfinite(load)
+    return np.asarray(np.where(short, line, last))
 
 
 def record_of(time: FloatArray, columns: Mapping[str, FloatArray], where: str = "record") -> Record:

@@ -2,7 +2,6 @@
 
 from rigwatch.wire.exchange.column_units import AMBIGUOUS, conversion
 from rigwatch.wire.exchange.exporting import export_session
-from rigwatch.wire.exchange.headers import Header, read_header
 from rigwatch.wire.exchange.importing import Imported, import_file
 from rigwatch.wire.exchange.mapping import ImportMapping, parse_map_option, parse_source
 from rigwatch.wire.exchange.table_files import columns_of, read_table
@@ -10,7 +9,6 @@ from rigwatch.wire.exchange.tables import Table
 
 __all__ = [
     "AMBIGUOUS",
-    "Header",
     "ImportMapping",
     "Imported",
     "Table",
@@ -20,6 +18,5 @@ __all__ = [
     "import_file",
     "parse_map_option",
     "parse_source",
-    "read_header",
     "read_table",
 ]

@@ -13,11 +13,10 @@ import numpy as np
 from rigwatch.wire.errors import ImportDataError, reason_of
 from rigwatch.wire.exchange.mapping import ImportMapping
 from rigwatch.wire.exchange.tables import Cells, Table
+from rigwatch.wire.texts import DELIMITERS, HEAD, encoding_of, found_head, is_number
 
 PART = 4096
 """Rows in memory at a time; a whole block of a session."""
-_DELIMITERS = ";\t,"
-"""Delimiters, in the order in which they are tried."""
 _DECIMAL_COMMA = re.compile(r"^\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*$")
 Rows = list[list[str]]
 
@@ -28,12 +27,14 @@ def read_csv(path: Path, mapping: ImportMapping) -> Table:
     Raises:
         ImportDataError: it is no text, has no header, or a row has another number of cells.
     """
-    source = _Source(path, None if path.is_file() else list(_text_lines(path)))
-    first = next(source.lines(), None)
-    if first is None:
+    encoding = _encoding(path)
+    source = _Source(path, encoding, None if path.is_file() else list(_text_lines(path, encoding)))
+    lines = list(islice(source.lines(), HEAD))
+    if not lines:
         raise ImportDataError(f"{path}: the file is empty, expected rows of data")
-    delimiter = _delimiter(path, mapping.delimiter, first)
-    names = next(_split(path, source.lines(), delimiter))
+    found = None if mapping.columns else found_head(lines, mapping.delimiter)
+    delimiter = found.delimiter if found else _delimiter(path, mapping.delimiter, lines[0])
+    names = list(found.names) if found else next(_split(path, iter(lines), delimiter))
     if mapping.columns:
         names = list(mapping.columns)
     elif _all_numbers(names):
@@ -46,7 +47,7 @@ def read_csv(path: Path, mapping: ImportMapping) -> Table:
         raise ImportDataError(
             f"{path}:1: found the columns {list(header)}, expected different names"
         )
-    start = 0 if mapping.columns else 1
+    start = found.rows if found else 0 if mapping.columns else 1
     count = sum(1 for _ in _Content(source, delimiter, header, start).rows())
     return CsvTable.of(_Content(source, delimiter, header, start, count))
 
@@ -56,12 +57,13 @@ class _Source:
     """The file's lines; those of a pipe, which is read once, are held."""
 
     path: Path
+    encoding: str
     held: list[str] | None = None
 
     def lines(self) -> Iterator[str]:
         """All lines up to the last that is not blank."""
         blank: list[str] = []
-        for line in _text_lines(self.path) if self.held is None else self.held:
+        for line in _text_lines(self.path, self.encoding) if self.held is None else self.held:
             blank.append(line)
             if line.strip():
                 yield from blank
@@ -160,14 +162,21 @@ class CsvTable(Table):
         return CsvTable.of(_Content(old.source, old.delimiter, old.header, old.first + rows, count))
 
 
-def _text_lines(path: Path) -> Iterator[str]:
+def _encoding(path: Path) -> str:
+    try:
+        return encoding_of(path)
+    except OSError as error:
+        raise ImportDataError(f"{path}: cannot be read: {reason_of(error)}") from error
+
+
+def _text_lines(path: Path, encoding: str) -> Iterator[str]:
     """Lines as `str.splitlines` has them."""
     try:
-        with path.open(encoding="utf-8-sig") as file:
+        with path.open(encoding=encoding) as file:
             for line in file:
                 yield from line.splitlines()
     except UnicodeDecodeError as error:
-        raise ImportDataError(f"{path}: found bytes that are not UTF-8, expected text") from error
+        raise ImportDataError(f"{path}: found bytes that are no text, expected text") from error
     except OSError as error:
         raise ImportDataError(f"{path}: cannot be read: {reason_of(error)}") from error
 
@@ -175,7 +184,7 @@ def _text_lines(path: Path) -> Iterator[str]:
 def _delimiter(path: Path, delimiter: str, first: str) -> str:
     if delimiter == "auto":
         # With semicolons or tabs as delimiters, commas are decimal commas.
-        return next((mark for mark in _DELIMITERS if mark in first), "whitespace")
+        return next((mark for mark in DELIMITERS if mark in first), "whitespace")
     if delimiter != "whitespace" and len(delimiter) != 1:
         expected = "auto, whitespace or one character"
         raise ImportDataError(f"{path}: delimiter: found {delimiter!r}, expected {expected}")
@@ -193,7 +202,7 @@ def _split(path: Path, lines: Iterator[str], delimiter: str) -> Iterator[list[st
 
 
 def _all_numbers(cells: list[str]) -> bool:
-    return all(re.fullmatch(r"\s*[+-]?\d*[.,]?\d+([eE][+-]?\d+)?\s*", cell) for cell in cells)
+    return all(map(is_number, cells))
 
 
 def _pointed(cell: str) -> str:

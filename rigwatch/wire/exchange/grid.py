@@ -78,6 +78,26 @@ def fit_grid(times: FloatArray, rate: float | None, max_hole: float) -> Grid:
     return Grid(rate_hz, grid, True, holes, _own(times, grid, rate_hz), extremes)
 
 
+def mean_while_held(grid: Grid, times: FloatArray, values: FloatArray) -> FloatArray:
+    """The mean of a held signal from each point of the grid to the next, shape of `grid.times`.
+
+    Args:
+        grid: the points.
+        times: at which the signal takes its values, shape (n,), increasing [s].
+        values: shape (n,); each holds until the next time.
+    """
+    period = 1 / grid.rate_hz
+    begin, end = grid.times, grid.times + period
+    first = np.maximum(np.searchsorted(times, begin, side="right") - 1, 0)
+    last = np.maximum(np.searchsorted(times, end, side="left") - 1, first)
+    until = np.append(times, max(float(times[-1]), float(end[-1])) + period)
+    areas = np.concatenate([[0.0], np.cumsum(values * np.diff(until))])
+    mean = (np.interp(end, until, areas) - np.interp(begin, until, areas)) / period
+    # A sum over the whole recording has rounding errors; a value that stays is that value.
+    stays = (values[first] == values[last]) & (last - first <= 1)
+    return np.asarray(np.where(stays, values[first], mean))
+
+
 def whole(rate_hz: float, times: FloatArray, steps_s: tuple[float, float]) -> Grid:
     """The grid of a recording without jitter and holes."""
     n = len(times)

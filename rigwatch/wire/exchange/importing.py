@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ImportDataError
 from rigwatch.wire.exchange.column_units import conversion
-from rigwatch.wire.exchange.grid import Grid, fit_grid, whole
+from rigwatch.wire.exchange.grid import Grid, fit_grid, mean_while_held, whole
 from rigwatch.wire.exchange.mapping import ImportMapping, Source, parse_source
 from rigwatch.wire.exchange.repeated_stamps import Stamps, increasing
 from rigwatch.wire.exchange.session_columns import is_native, native_blocks, native_rate
@@ -94,8 +94,11 @@ def _time_base(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[s
         return _TimeBase(grid, stamps), stamps.remarks
     shortest, longest = grid.steps_s
     holes = int(np.count_nonzero(grid.in_hole))
+    span = f"{shortest * 1e3:.3g} to {longest * 1e3:.3g} ms"
+    if shortest >= 1:
+        span = f"{shortest:.3g} to {longest:.3g} s"
     remark = (
-        f"time stamps in steps of {shortest * 1e3:.3g} to {longest * 1e3:.3g} ms: "
+        f"time stamps in steps of {span}: "
         f"{len(times)} samples resampled to {len(grid.times)} at {grid.rate_hz:g} Hz"
     )
     return _TimeBase(grid, stamps), (
@@ -164,7 +167,10 @@ def _sample_blocks(
                 _channel(name, text, part, kept, mapping) for name, text in mapping.channels.items()
             )
             if base.grid.jittered:
-                columns = tuple(_resampled(c, base.grid, base.stamps.times) for c in columns)
+                columns = tuple(
+                    _resampled(c, base.grid, base.stamps.times, held=c.name in mapping.held)
+                    for c in columns
+                )
             yield _block(mapping.device, columns, base.grid, first, start_ns)
             first += len(columns[0].values)
 
@@ -192,11 +198,21 @@ def _channel(
     return Column(name, unit, values, flags)
 
 
-def _resampled(column: Column, grid: Grid, times: FloatArray) -> Column:
-    """Interpolated between finite neighbours; points next to a missing sample are invalid."""
+def _resampled(column: Column, grid: Grid, times: FloatArray, *, held: bool) -> Column:
+    """Interpolated between finite neighbours; points next to a missing sample are invalid.
+
+    Args:
+        column: one value for each time.
+        grid: of the result.
+        times: shape (n,) [s].
+        held: whether each value acts until the next row: the mean until the next point of the grid
+            is taken then, since a line between two commands is a command that nobody gave.
+    """
     missing = column.quality != quality.GOOD
     if missing.all():
         found = np.full(len(grid.times), np.nan)
+    elif held and not grid.own.any():
+        found = mean_while_held(grid, times[~missing], column.values[~missing])
     else:
         found = np.interp(grid.times, times[~missing], column.values[~missing])
     near_missing = np.interp(grid.times, times, missing.astype(np.float64)) > 0

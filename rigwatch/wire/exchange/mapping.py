@@ -54,6 +54,13 @@ class ImportMapping(Section, frozen=True):
     max_hole: Annotated[
         float, Meta(gt=0, description="longest step that is bridged, in sample periods")
     ] = 10.0
+    held: Annotated[
+        tuple[str, ...],
+        Meta(
+            description="channels that keep each value until the next row, as a command does: if"
+            " steps are uneven, a sample is their mean until the next one"
+        ),
+    ] = ()
     flag_missing: Annotated[
         bool, Meta(description="take NaN and empty cells as invalid samples, not as an error")
     ] = False

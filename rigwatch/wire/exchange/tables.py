@@ -9,6 +9,7 @@ import numpy as np
 
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ImportDataError
+from rigwatch.wire.texts import TimeStyle, past_midnight, time_style
 
 Cells = Sequence[str] | np.ndarray[Any, Any]
 """A column as it was read, text or numbers."""
@@ -45,14 +46,15 @@ class Table:
     def states_time(self, column: str) -> bool:
         """Whether a column has dates or durations, which are numbers in seconds."""
         cells = self.cells[column]
-        return isinstance(cells, np.ndarray) and cells.dtype.kind in "mM"
+        dated = isinstance(cells, np.ndarray) and cells.dtype.kind in "mM"
+        return dated or self._time_style(column) is not None
 
     def parts(self) -> Iterator["Table"]:
         """The rows in parts that fit into memory: here all of them, which are there already."""
         yield self
 
     def numbers(self, column: str, allow_missing: bool = False) -> FloatArray:
-        """A column as numbers; dates since 1970 and durations in seconds.
+        """A column as numbers; dates since 1970, durations and times of day in seconds.
 
         Args:
             column: its name.
@@ -61,7 +63,30 @@ class Table:
         Raises:
             ImportDataError: a cell is no number; its place is named.
         """
+        style = self._time_style(column)
+        if style is not None:
+            found = _joined([part._times(column, style) for part in self.parts()])
+            return past_midnight(found) if style.form == "clock" else found
         return _joined([part._numbers(column, allow_missing) for part in self.parts()])
+
+    def _time_style(self, column: str) -> TimeStyle | None:
+        """How the column states dates or times of day as text; None if it does not."""
+        cells = self.cells[column]
+        if isinstance(cells, np.ndarray) and cells.dtype.kind not in "OSU":
+            return None
+        return time_style(str(cell) for cell in cells)
+
+    def _times(self, column: str, style: TimeStyle) -> FloatArray:
+        found = np.empty(len(self.cells[column]))
+        for row, cell in enumerate(self.cells[column]):
+            try:
+                found[row] = style.seconds(str(cell))
+            except ValueError:
+                raise ImportDataError(
+                    f"{self.place(row, column)}: found {str(cell)!r}, expected a time written as"
+                    " in the first row"
+                ) from None
+        return found
 
     def _numbers(self, column: str, allow_missing: bool) -> FloatArray:
         cells = self.cells[column]

@@ -50,12 +50,12 @@ class Exchange:
     held_out_error: float
     p_value: float
 
-    def text(self, unit: str) -> str:
-        """The offer in words, with the commands that take it."""
+    def text(self, unit: str, study: str) -> str:
+        """The offer in words, with the commands that take it in the study's folder."""
         return (
             f"{self.effect}@{self.port} in place of {self.instead_of}@{self.port} lowers"
             f" the held-out error to {self.held_out_error:.3g} {unit}"
-            " (rigwatch undo, then rigwatch add)"
+            f" (rigwatch undo {study}, then rigwatch add {study} {self.effect} --port {self.port})"
         )
 
 

@@ -179,7 +179,8 @@ def _with_exchange(bench: Bench, found: Explanation, progress: Progress) -> Expl
     offer = exchange(bench, progress)
     if offer is None:
         return found
-    return replace(found, text=f"{found.text}; but {offer.text(found.error_unit)}", exchange=offer)
+    told = offer.text(found.error_unit, str(bench.study.folder))
+    return replace(found, text=f"{found.text}; but {told}", exchange=offer)
 
 
 def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked], Verdict]:

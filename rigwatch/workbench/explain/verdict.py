@@ -117,6 +117,12 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
             f"{best.label} lowers the held-out error most, but {', '.join(elsewhere)} explains more"
             f" than {CONTRADICTED:g} times as much of the training error"
         )
+    elif word == "missing_effect" and (better := _explaining_all(base, best, rows, floor)):
+        word, rivals = "undetermined", better
+        text = (
+            f"{best.label} lowers the held-out error most, but {', '.join(better)} explains more of"
+            " all recordings together"
+        )
     elif word == "missing_effect" and hardly_trains(base, best, floor):
         word = "unknown_effect"
         text = f"the best known effect, {best.label}, leaves nearly all of the training error"
@@ -139,6 +145,38 @@ def _explaining_training(base: Fitted, best: Ranked, rows: Sequence[Ranked]) -> 
         and row.fitted is not None
         and row.held_out_error < base.held_out_error
         and base.train_error**2 - row.fitted.train_error**2 > least
+    )
+
+
+def _explaining_all(
+    base: Fitted, best: Ranked, rows: Sequence[Ranked], floor: NoiseFloor
+) -> tuple[str, ...]:
+    """Labels of accepted effects, no less simple, that leave less of all recordings than the best.
+
+    While much remains, that one effect leads on the few recordings held out and another on all of
+    them is chance: what is missing beside them may favour either.
+    """
+    assert best.fitted is not None
+    if explains(base, best, floor):
+        return ()
+    least = _energy(best.fitted)
+    return tuple(
+        row.label
+        for row in rows
+        if row is not best
+        and row.accepted
+        and row.fitted is not None
+        and row.free <= best.free
+        and not _same_family(best, row)
+        and _energy(row.fitted) < least
+    )
+
+
+def _energy(fitted: Fitted) -> float:
+    """Sum of the scaled squares of all residuals, of the training and of what is held out."""
+    return sum(
+        float(np.nansum(np.square(side.residuals / side.scale)))
+        for side in (fitted.train, fitted.held_out)
     )
 
 

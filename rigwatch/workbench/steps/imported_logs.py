@@ -92,7 +92,9 @@ def imported(
             continue
         table = read_table(path, logs.mapping)
         try:
-            found = matched(table.names, model, logs.mapping.channels, logs.mapping.time)
+            dated = [name for name in table.names if table.states_time(name)]
+            given, counted = logs.mapping.channels, logs.mapping.rate is not None
+            found = matched(table.names, model, given, logs.mapping.time, dated, counted=counted)
         except ModelError as error:
             raise ModelError(f"{path}: {error}") from None
         # A log of a real machine has gaps: missing values are invalid samples, not errors.
@@ -101,6 +103,7 @@ def imported(
             logs.mapping,
             channels=found.channels,
             time=found.time,
+            held=_held(model),
             flag_missing=True,
             any_unit=True,
         )
@@ -110,6 +113,11 @@ def imported(
         remarks += [(path.name, remark) for remark in told]
         reading = reading or found
     return reading or Matched({}, "", {}, ()), _each_once(remarks), stated
+
+
+def _held(model: Model) -> tuple[str, ...]:
+    """Channels of inputs that the model file calls held from sample to sample."""
+    return tuple(o.channel or n for n, o in model.inputs.items() if model.held(n) == "zero")
 
 
 def _each_once(remarks: list[tuple[str, str]]) -> list[str]:

@@ -1,13 +1,13 @@
 """Matches columns of a log to a model's signals: by name, otherwise by the only matching unit."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 from rigwatch.physics.engine.equations import Input, Model, Output
 from rigwatch.wire.errors import ModelError
-from rigwatch.wire.exchange import Header, read_header
+from rigwatch.wire.texts import Header, read_header
 from rigwatch.wire.units import UnitError, may_count_turns, unit_of
 
 TIMES = ("time", "t", "timestamp", "time_stamp", "seconds", "sec")
@@ -34,7 +34,13 @@ class Matched:
 
 
 def matched(
-    columns: Sequence[str], model: Model, given: Mapping[str, str], when: str = ""
+    columns: Sequence[str],
+    model: Model,
+    given: Mapping[str, str],
+    when: str = "",
+    dated: Collection[str] = (),
+    *,
+    counted: bool = False,
 ) -> Matched:
     """The columns of a model's signals.
 
@@ -43,13 +49,14 @@ def matched(
         model: the model whose signals are matched.
         given: mapping given by the user, channel = "column[unit]".
         when: the time's column given by the user.
+        dated: columns that hold dates or times of day, which need no unit.
+        counted: whether a rate is given, so that only a column named as the time is one.
 
     Raises:
         ModelError: no column, or more than one, matches a signal; the text names the option.
     """
     headers = [read_header(column) for column in columns]
-    times = [header for header in headers if header.name in TIMES and _is_time(header)]
-    time = times[0] if times and not when else None
+    time = None if when else _time_of(headers, dated, model, counted=counted)
     free = [h for h in headers if h is not time and not when.startswith(h.column)]
     signals: dict[str, Input | Output] = {**model.inputs, **model.outputs}
     found, remarks = dict(given), list[str]()
@@ -76,13 +83,28 @@ def matched(
         if made is None:
             raise ModelError(_unknown(name, channel, signal, columns))
         rates[channel] = made
-    if time is not None and not time.units:
+    if time is not None and not time.units and time.column not in dated:
         remarks.append(
             f"{time.column}: no unit in its header, assumed s; for ms give --time"
             f" '{time.column}[ms]'"
         )
-    when = f"{time.column}[{_time_unit(time)}]" if time else when
+    if time is not None:
+        when = f"{time.column}[{'s' if time.column in dated else _time_unit(time)}]"
     return Matched(found, when, rates, tuple(remarks))
+
+
+def _time_of(
+    headers: Sequence[Header], dated: Collection[str], model: Model, *, counted: bool
+) -> Header | None:
+    """The column of the time: by name, otherwise the only one with dates or a unit of time."""
+    signals = {*model.inputs, *model.outputs}
+    named = [h for h in headers if h.name in TIMES and (h.column in dated or _is_time(h))]
+    stating = [h for h in headers if h.column in dated]
+    measured = [h for h in headers if h.units and _is_time(h) and h.name not in signals]
+    for chosen in (named[:1],) if counted else (named[:1], stating, measured):
+        if len(chosen) == 1:
+            return chosen[0]
+    return None
 
 
 def _is_time(header: Header) -> bool:

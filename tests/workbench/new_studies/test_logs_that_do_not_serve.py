@@ -73,10 +73,11 @@ def test_a_time_under_another_name_is_asked_for_and_may_be_named_as_it_stands(
     tmp_path, run, capsys
 ):
     time, voltage, speed = run.values()
-    path = written(tmp_path / "run.csv", {"Zeit [s]": time, "u [V]": voltage, "n [rad/s]": speed})
+    columns = {"Zeit [s]": time, "pause [s]": 0 * time, "u [V]": voltage, "n [rad/s]": speed}
+    path = written(tmp_path / "run.csv", columns)
     assert new(tmp_path, path) == 2
     said = capsys.readouterr().err
-    assert "expected --time 'COLUMN[s]' or --rate HZ; its columns are Zeit [s], u [V]" in said
+    assert "expected --time 'COLUMN[s]' or --rate HZ; its columns are Zeit [s], pause [s]" in said
     assert new(tmp_path, path, "--time", "Zeit [s]") == 0
     dt = prepare(open_study(tmp_path / "study")).train.dt
     assert dt == pytest.approx(time[1] - time[0], rel=1e-6)

@@ -41,6 +41,7 @@ def test_a_slider_that_turns_out_to_be_behind_play_is_offered_in_its_place(
     if found is None:
         return
     assert "in place of jenkins@load" in before.text
+    assert f"rigwatch add {study.folder} {found.effect} --port load)" in before.text
     undo(open_study(study.folder))
     after = add(open_study(study.folder), found.effect, found.port).after
     assert after.held_out_error == pytest.approx(found.held_out_error, rel=0.05)

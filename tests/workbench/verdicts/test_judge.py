@@ -170,6 +170,35 @@ def test_an_effect_that_leaves_most_is_not_the_answer() -> None:
     assert judge(base(3.0), [best(error=2.7)], QUIET).word == "unknown_effect"
 
 
+def trained(found: Ranked, error: float) -> Ranked:
+    """An effect with another error in training than held out."""
+    assert found.fitted is not None
+    found.fitted = replace(found.fitted, train=base(error).train)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("other", "left", "word"),
+    [
+        pytest.param({}, 1.6, "undetermined", id="explains more of all recordings"),
+        pytest.param({"free": 2}, 1.6, "missing_effect", id="with more parameters"),
+        pytest.param({"accepted": False}, 1.6, "missing_effect", id="refused"),
+        pytest.param({"family": "drag"}, 1.6, "missing_effect", id="of one family"),
+        pytest.param({}, 1.05, "missing_effect", id="where only noise remains"),
+    ],
+)
+def test_an_effect_that_leads_on_the_recordings_held_out_alone_is_not_named(
+    other: dict[str, Any], left: float, word: str
+) -> None:
+    only = trained(best(error=left, family="drag", cosines={"b@x": 0.3}), 2.4)
+    rival = trained(row("b@x", left + 0.2, **other), 2.0)
+    found = judge(replace(base(), train=base(2.9).train), [only, rival], QUIET)
+    assert found.word == word
+    assert ("b@x explains more of all recordings together" in found.text) == (
+        word == "undetermined"
+    )
+
+
 def test_what_hardly_lowers_the_training_error_is_not_named_with_confidence() -> None:
     near, only = base(1.3), best(error=1.1)
     assert judge(near, [only], QUIET).word == "missing_effect"
