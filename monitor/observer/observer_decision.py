@@ -207,9 +207,10 @@ def _follow_inputs(
         forget_lateness(kept.lateness)
         count[CHANGED] = 0
     row[E] = corrected(row[E], row[MOVED], kept.edges)
-    if not judging or (calm and (count[ABOVE] == 0 or is_late(kept.lateness))):
+    if calm or not judging:
         variance += edges_unsure(row[UNSURE_INPUT], kept.edges)
-        follow_lateness(row, largest * variance, judging, kept.lateness)
+        learns = not judging or count[ABOVE] == 0 or is_late(kept.lateness)
+        follow_lateness(row, largest * variance, judging, learns, kept.lateness)
     if not judging and lateness_changes(kept.lateness):
         count[CHANGED] = -LONG
 

@@ -28,7 +28,7 @@ def learnt(
     rows[:, LATE_UNIT], rows[:, DRY_UNIT] = LATE, dry
     kept = no_lateness() if kept is None else kept
     for row in rows:
-        follow_lateness(row, NOISE**2, False, kept)
+        follow_lateness(row, NOISE**2, False, True, kept)
     return kept
 
 
@@ -63,7 +63,7 @@ def test_a_residual_as_large_as_in_commissioning_is_not_explained() -> None:
     rows[:, E], rows[:, LATE_UNIT], rows[:, DRY_UNIT] = 0.5 * LATE, LATE, DRY
     kept = no_lateness()
     for row in rows:
-        follow_lateness(row, 4.0 * float(np.mean(rows[:, E] ** 2)), False, kept)
+        follow_lateness(row, 4.0 * float(np.mean(rows[:, E] ** 2)), False, True, kept)
 
     assert kept[TAU] == 0.0
     assert not is_late(kept)
@@ -80,6 +80,6 @@ def test_a_lateness_that_jumps_is_said_to_change() -> None:
     row = np.zeros(len(COLUMNS))
     for late in LATE[: round(SLOW / 4)]:
         row[E], row[LATE_UNIT] = 0.4 * late, late
-        follow_lateness(row, NOISE**2, False, kept)
+        follow_lateness(row, NOISE**2, False, True, kept)
 
     assert lateness_changes(kept)
