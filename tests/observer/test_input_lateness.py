@@ -69,6 +69,32 @@ def test_a_residual_as_large_as_in_commissioning_is_not_explained() -> None:
     assert not is_late(kept)
 
 
+def test_a_lateness_that_leaves_what_a_healthy_rig_does_is_learnt() -> None:
+    # A rig that its equations describe less well: half of its largest residual is usual.
+    healthy = 0.9 * np.sin(1.7 * AT + 0.3)
+    kept, largest = no_lateness(), 2.0 * float(np.mean(healthy**2))
+    rows = np.zeros((N, len(COLUMNS)))
+    rows[:, E], rows[:, LATE_UNIT] = healthy - 0.6 * LATE, LATE
+    rows[:, DRY_UNIT] = np.sign(np.cos(AT))
+    for row in rows:
+        follow_lateness(row, largest, True, True, kept)
+
+    assert kept[TAU] == pytest.approx(-0.6, abs=0.1)
+
+
+def test_what_was_seen_before_a_deviation_is_learnt_once_the_motion_is_known() -> None:
+    kept, row = no_lateness(), np.zeros(len(COLUMNS))
+    for late, dry in zip(LATE, DRY, strict=True):
+        row[E], row[LATE_UNIT], row[DRY_UNIT] = -0.5 * late, late, dry
+        follow_lateness(row, 1.0, True, True, kept)
+    assert kept[TAU] == 0.0
+
+    row[E] = 10.0
+    follow_lateness(row, NOISE**2, True, False, kept)
+
+    assert kept[TAU] == pytest.approx(-0.5, abs=0.01)
+
+
 def test_a_lateness_that_is_gone_is_forgotten() -> None:
     kept = learnt(-0.5 * LATE)
 
