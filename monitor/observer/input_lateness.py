@@ -3,11 +3,11 @@
 A generator that starts again steps at another place between two samples, and one that does not hold
 its voltage acts half a sample earlier than one that does. To first order the residual is then τ·s,
 with s the response to inputs late by one sample and τ unknown. τ is taken from the residual where
-it explains nearly all of it, or most of it and leaves no more than a healthy rig does, and leaves
-at most half of what dry friction would. It is learnt while the rig is not judged and followed
-slowly afterwards, so that a fault, which is sudden, is not learnt. What was seen before a deviation
-still decides during it: only a motion that is steady is known to have been recorded, and then the
-healthy residual is known to be smaller than it was taken to be.
+it explains nearly all of it and leaves at most half of what dry friction would. It is learnt while
+the rig is not judged and followed slowly afterwards, so that a fault, which is sudden, is not
+learnt. Only a motion that is steady is known to have been recorded; then the healthy residual is
+known to be smaller than it was taken to be, and what was seen before decides anew, also where it
+now deviates.
 """
 
 # Compiled functions are untyped to mypy.
@@ -23,10 +23,13 @@ MOST = 1.0
 """Largest lateness [samples]."""
 QUICK, SLOW = 32.0, 128.0
 """Memory of what it is learnt from, before and while the rig is judged [samples]."""
-EXPLAINS, REST, MOST_OF_IT = 0.85, 0.6, 0.5
-"""Share of the residual's energy that it must explain, besides a share of the largest healthy one,
-which is what a healthy rig leaves on average, and in any case; less than the largest healthy one is
-not explained at all.
+EXPLAINS, REST = 0.85, 0.25
+"""Share of the residual's energy that it must explain, besides a share of the largest healthy one;
+less than that one is not explained at all.
+"""
+USUAL, MOST_OF_IT = 0.6, 0.5
+"""The same when the motion has just become known: what a healthy rig leaves on average, and the
+share that must be explained in any case. Later, so little would be a small fault.
 """
 RATHER = 2.0
 """Ratio of what dry friction leaves to what it leaves above which it is a lateness: where both
@@ -63,8 +66,8 @@ def forget_lateness(kept: FloatArray) -> None:
 
 
 @njit()
-def follow_lateness(
-    row: FloatArray, largest: float, judging: bool, learns: bool, kept: FloatArray
+def follow_lateness(  # noqa: PLR0917 -- a kernel
+    row: FloatArray, largest: float, judging: bool, learns: bool, anew: bool, kept: FloatArray
 ) -> None:
     """Follow the lateness to a sample.
 
@@ -73,13 +76,17 @@ def follow_lateness(
         largest: mean square of the healthy residual at the present motion.
         judging: whether the rig is judged.
         learns: whether the sample counts, or only those before it, as where it deviates.
+        anew: whether the motion has just become known.
         kept: the carried figures.
     """
     if learns:
         _learn(row, kept)
     first = OF_SLOW if judging and not is_late(kept) else OF_QUICK
     energy, found = kept[first + ERRORS], _best(kept, first)
-    least = min((1.0 - EXPLAINS) * energy + REST * largest, (1.0 - MOST_OF_IT) * energy)
+    least = (1.0 - EXPLAINS) * energy + REST * largest
+    if anew:
+        usually = (1.0 - EXPLAINS) * energy + USUAL * largest
+        least = max(least, min(usually, (1.0 - MOST_OF_IT) * energy))
     least = min(least, _rubbing(kept, first) / RATHER)
     if energy > largest and _left(found, kept, first) < least:
         kept[TAU] = found
