@@ -10,7 +10,13 @@ from monitor.drives.held_readings import HeldReadings
 from monitor.drives.input_steps import InputSteps, Steps
 from monitor.drives.jittered_edges import JitteredEdges
 from monitor.drives.jittered_steps import Jittered, JitteredSteps
-from monitor.drives.recorded_drives import BANDS, DriveBands, RecordedDrives, steady_energies
+from monitor.drives.recorded_drives import (
+    BANDS,
+    DriveBands,
+    RecordedDrives,
+    same_drive,
+    steady_energies,
+)
 from monitor.drives.sliding_edges import Moved, SlidingEdges
 from monitor.drives.sliding_steps import Sliding, SlidingSteps
 
@@ -36,5 +42,6 @@ __all__ = [
     "edges_unsure",
     "follow_edges",
     "no_edges",
+    "same_drive",
     "steady_energies",
 ]

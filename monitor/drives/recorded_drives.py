@@ -51,7 +51,7 @@ class RecordedDrives:
         """Whether a drive was recorded, shape (n,), from its energies, shape (n, BANDS)."""
         found = np.zeros(len(energies), np.bool_)
         for drive in self._known:
-            found |= _alike(energies, drive)
+            found |= same_drive(energies, drive)
         return found
 
 
@@ -60,11 +60,12 @@ def steady_energies(energies: FloatArray) -> tuple[float, ...]:
     if not energies.size:
         return ()
     middle = np.median(energies, axis=0)
-    steady = middle.sum() > 0.0 and float(np.mean(_alike(energies, middle))) >= STEADY
+    steady = middle.sum() > 0.0 and float(np.mean(same_drive(energies, middle))) >= STEADY
     return tuple(middle.tolist()) if steady else ()
 
 
-def _alike(energies: FloatArray, drive: FloatArray) -> BoolArray:
+def same_drive(energies: FloatArray, drive: FloatArray) -> BoolArray:
+    """Whether energies, shape (n, BANDS), are those of a drive, shape (BANDS,)."""
     near = np.abs(energies - drive) <= ALIKE * drive + FAINT * drive.sum()
     return np.asarray(near.all(axis=1))
 

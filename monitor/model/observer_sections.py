@@ -115,6 +115,13 @@ class HealthyLimits(Section, frozen=True, kw_only=True):
     steady_drive_energies: Annotated[
         Floats, Meta(description="energies of the bands of each steady healthy drive, in turn")
     ] = ()
+    steady_motion_bands: Annotated[
+        Floats,
+        Meta(
+            description="energies of the bands of the drive of each steady healthy motion, in turn;"
+            " zeros if it is not a steady one"
+        ),
+    ] = ()
     steady_energies: Annotated[
         Floats, Meta(description="largest energy over a second of each")
     ] = ()

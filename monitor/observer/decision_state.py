@@ -56,6 +56,7 @@ class Counts(NamedTuple):
     since_jump: int = 11
     judging: int = 12
     lasted: int = 13
+    since_known: int = 14
 
 
 AT = Counts()

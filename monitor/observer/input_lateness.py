@@ -5,7 +5,9 @@ its voltage acts half a sample earlier than one that does. To first order the re
 with s the response to inputs late by one sample and τ unknown. τ is taken from the residual where
 it explains nearly all of it and leaves at most half of what dry friction would. It is learnt while
 the rig is not judged and followed slowly afterwards, so that a fault, which is sudden, is not
-learnt.
+learnt. Only a motion that is steady is known to have been recorded; then the healthy residual is
+known to be smaller than it was taken to be, and what was seen before decides anew, also where it
+now deviates.
 """
 
 # Compiled functions are untyped to mypy.
@@ -24,6 +26,10 @@ QUICK, SLOW = 32.0, 128.0
 EXPLAINS, REST = 0.85, 0.25
 """Share of the residual's energy that it must explain, besides a share of the largest healthy one;
 less than that one is not explained at all.
+"""
+USUAL, MOST_OF_IT = 0.6, 0.5
+"""The same when the motion has just become known: what a healthy rig leaves on average, and the
+share that must be explained in any case. Later, so little would be a small fault.
 """
 RATHER = 2.0
 """Ratio of what dry friction leaves to what it leaves above which it is a lateness: where both
@@ -60,30 +66,44 @@ def forget_lateness(kept: FloatArray) -> None:
 
 
 @njit()
-def follow_lateness(row: FloatArray, largest: float, judging: bool, kept: FloatArray) -> None:
-    """Learn from a sample.
+def follow_lateness(  # noqa: PLR0917 -- a kernel
+    row: FloatArray, largest: float, judging: bool, learns: bool, anew: bool, kept: FloatArray
+) -> None:
+    """Follow the lateness to a sample.
 
     Args:
         row: its judged columns, see `missing_force`.
         largest: mean square of the healthy residual at the present motion.
         judging: whether the rig is judged.
+        learns: whether the sample counts, or only those before it, as where it deviates.
+        anew: whether the motion has just become known.
         kept: the carried figures.
     """
-    for first, memory in ((OF_QUICK, QUICK), (OF_SLOW, SLOW)):
-        _average(row[E] * row[E], first + ERRORS, memory, kept)
-        _average(row[E] * row[LATE_UNIT], first + PRODUCTS, memory, kept)
-        _average(row[LATE_UNIT] * row[LATE_UNIT], first + RESPONSES, memory, kept)
-        _average(row[E] * row[DRY_UNIT], first + RUBBED, memory, kept)
-        _average(row[DRY_UNIT] * row[DRY_UNIT], first + FRICTIONS, memory, kept)
+    if learns:
+        _learn(row, kept)
     first = OF_SLOW if judging and not is_late(kept) else OF_QUICK
     energy, found = kept[first + ERRORS], _best(kept, first)
-    least = min((1.0 - EXPLAINS) * energy + REST * largest, _rubbing(kept, first) / RATHER)
+    least = (1.0 - EXPLAINS) * energy + REST * largest
+    if anew:
+        usually = (1.0 - EXPLAINS) * energy + USUAL * largest
+        least = max(least, min(usually, (1.0 - MOST_OF_IT) * energy))
+    least = min(least, _rubbing(kept, first) / RATHER)
     if energy > largest and _left(found, kept, first) < least:
         kept[TAU] = found
     elif _left(kept[TAU], kept, first) > energy:
         kept[TAU] = 0.0
     kept[FOR] = kept[FOR] + 1.0 if abs(kept[TAU]) > UNSTEADY else 0.0
     kept[AGO] = 0.0 if kept[FOR] >= SHOWN else min(kept[AGO] + 1.0, RECENT)
+
+
+@njit()
+def _learn(row: FloatArray, kept: FloatArray) -> None:
+    for first, memory in ((OF_QUICK, QUICK), (OF_SLOW, SLOW)):
+        _average(row[E] * row[E], first + ERRORS, memory, kept)
+        _average(row[E] * row[LATE_UNIT], first + PRODUCTS, memory, kept)
+        _average(row[LATE_UNIT] * row[LATE_UNIT], first + RESPONSES, memory, kept)
+        _average(row[E] * row[DRY_UNIT], first + RUBBED, memory, kept)
+        _average(row[DRY_UNIT] * row[DRY_UNIT], first + FRICTIONS, memory, kept)
 
 
 @njit()

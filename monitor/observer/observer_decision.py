@@ -85,8 +85,8 @@ from rigwatch.wire.kernel import kernel
 
 (
     HEAD, FILLED, SINCE_START, QUIET, OUTSIDE, ONSET, DEPARTURE_AGO, AGREED, DISAGREED, CHANGED,
-    ABOVE, JUMP_AGO, WAS_JUDGING,
-) = range(13)  # fmt: skip
+    ABOVE, JUMP_AGO, WAS_JUDGING, LASTED, KNOWN_AGO,
+) = range(15)  # fmt: skip
 """Indices of `decision_state.Counts` as constants for the kernel."""
 LOOKS = 3
 """Consecutive samples that must agree on friction."""
@@ -207,9 +207,12 @@ def _follow_inputs(
         forget_lateness(kept.lateness)
         count[CHANGED] = 0
     row[E] = corrected(row[E], row[MOVED], kept.edges)
-    if not judging or (calm and (count[ABOVE] == 0 or is_late(kept.lateness))):
+    count[KNOWN_AGO] = 0 if np.isinf(usual[USUAL_MEDIUM]) else count[KNOWN_AGO] + 1
+    anew = 0 < count[KNOWN_AGO] <= LONG
+    learns = not judging or (calm and (count[ABOVE] == 0 or is_late(kept.lateness)))
+    if learns or (calm and anew):
         variance += edges_unsure(row[UNSURE_INPUT], kept.edges)
-        follow_lateness(row, largest * variance, judging, kept.lateness)
+        follow_lateness(row, largest * variance, judging, learns, anew, kept.lateness)
     if not judging and lateness_changes(kept.lateness):
         count[CHANGED] = -LONG
 

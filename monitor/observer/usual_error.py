@@ -3,8 +3,9 @@
 What equations leave of a healthy rig depends on the motion and hardly on anything else. A steady
 motion that was recorded at commissioning is therefore compared with what was left of it then,
 which is far less than the worst of all motions. A smaller motion of the same kind, as faults of the
-drive cause, leaves no more than that. Of any other motion, and while the motion changes, the
-extremes of a healthy rig are not known.
+drive cause, leaves no more than that. Under a drive that was recorded a healthy rig moves as it did
+then, so that any other steady motion is compared with that recording as well. Of all others, and
+while the motion changes, the extremes of a healthy rig are not known.
 """
 
 from collections.abc import Iterator
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from monitor.drives import BANDS, same_drive
 from monitor.model import HealthyLimits
 from monitor.observer.spectral_width import MEMORY, Spectrum
 from rigwatch.wire.arrays import FloatArray
@@ -47,13 +49,17 @@ class Extremes(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """A steady motion, and the extremes of its healthy residual."""
+    """A steady motion, the extremes of its healthy residual, and energies of the drive's bands.
+
+    The energies are zeros if the drive is not a steady one.
+    """
 
     pace: float
     size: float
     narrow: float
     drive: float
     extremes: Extremes
+    bands: tuple[float, ...] = (0.0,) * BANDS
 
 
 class UsualError:
@@ -68,24 +74,29 @@ class UsualError:
         self._known = tuple(_known(limits))
         self._smooth = _Smooth(rate)
 
-    def update(self, seen: Spectrum, drive: FloatArray) -> FloatArray:
+    def update(self, seen: Spectrum, drive: FloatArray, bands: FloatArray) -> FloatArray:
         """The extremes after each sample, infinite where they are not known, shape (4, n).
 
         Args:
             seen: the motion.
             drive: its pace, see `monitor.drives.Drive`.
+            bands: its energies, see `monitor.drives.DriveBands`, shape (n, BANDS).
         """
         smooth = self._smooth.update(seen)
         steady = np.abs(seen.pace - smooth.pace) <= RIPPLE * PACE * smooth.pace
         steady &= np.abs(seen.size - smooth.size) <= RIPPLE * SIZE * smooth.size
-        found, smaller = np.zeros((2, len(Extremes._fields), seen.pace.size))
+        settled = steady & (np.abs(seen.size - smooth.size) <= SIZE * smooth.size)
+        found, smaller, driven = np.zeros((3, len(Extremes._fields), seen.pace.size))
         for motion in self._known:
             alike, ratio = _alike(smooth, drive, motion), smooth.size / motion.size
             same = alike & (np.abs(ratio - 1.0) <= SIZE)
             found[:, same] = np.maximum(found[:, same], np.array(motion.extremes)[:, None])
             less = alike & (ratio >= SMALLEST) & (ratio < 1.0 - SIZE)
             smaller[:, less] = np.maximum(smaller[:, less], _no_more(motion.extremes, ratio[less]))
-        found = np.where(found > 0.0, found, smaller)
+            other = settled & (ratio > 1.0 + SIZE) & _driven(bands, motion)
+            driven[:, other] = np.maximum(driven[:, other], np.array(motion.extremes)[:, None])
+        for known in (smaller, driven):
+            found = np.where(found > 0.0, found, known)
         return np.where(steady & (found > 0.0), found, np.inf)
 
 
@@ -127,14 +138,23 @@ class _Smooth:
 
 def _known(limits: HealthyLimits) -> Iterator[Motion]:
     # Model files of earlier versions do not tell drives apart, and have the lasting energy only.
-    drives = limits.steady_drives or (0.0,) * len(limits.steady_paces)
+    count = len(limits.steady_paces)
+    drives = limits.steady_drives or (0.0,) * count
+    bands = np.reshape(limits.steady_motion_bands or (0.0,) * count * BANDS, (-1, BANDS))
     spectra = limits.steady_paces, limits.steady_sizes, limits.steady_narrow
     shapes = zip(*spectra, drives, strict=True)
     windows = limits.steady_shorts, limits.steady_mediums, limits.steady_frictions
-    unknown = (np.inf,) * len(limits.steady_paces)
+    unknown = (np.inf,) * count
     extremes = zip(limits.steady_energies, *(each or unknown for each in windows), strict=True)
-    for shape, largest in zip(shapes, extremes, strict=True):
-        yield Motion(*shape, Extremes(*largest))
+    for shape, largest, own in zip(shapes, extremes, bands, strict=True):
+        yield Motion(*shape, Extremes(*largest), tuple(own.tolist()))
+
+
+def _driven(bands: FloatArray, motion: Motion) -> NDArray[np.bool_]:
+    """Whether the drive is that of a motion."""
+    if sum(motion.bands) == 0.0:
+        return np.zeros(len(bands), np.bool_)
+    return same_drive(bands, np.array(motion.bands))
 
 
 def _no_more(known: Extremes, ratio: FloatArray) -> FloatArray:

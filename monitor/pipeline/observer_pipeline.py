@@ -106,7 +106,7 @@ class ObserverMonitor:
         known = self.model.motion_range
         assert known is not None
         drive = drive_energy(seen.rows, known, layout.motions)
-        usual = self._usual.update(motion, seen.drive)
+        usual = self._usual.update(motion, seen.drive, seen.bands)
         decide(
             seen.judged, speed, grown, drive, inside, np.asarray(jumped.any(axis=1)),
             steady, usual, seen.state, self.rules, self._state, out,

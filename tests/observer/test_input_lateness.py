@@ -28,7 +28,7 @@ def learnt(
     rows[:, LATE_UNIT], rows[:, DRY_UNIT] = LATE, dry
     kept = no_lateness() if kept is None else kept
     for row in rows:
-        follow_lateness(row, NOISE**2, False, kept)
+        follow_lateness(row, NOISE**2, False, True, False, kept)
     return kept
 
 
@@ -63,10 +63,39 @@ def test_a_residual_as_large_as_in_commissioning_is_not_explained() -> None:
     rows[:, E], rows[:, LATE_UNIT], rows[:, DRY_UNIT] = 0.5 * LATE, LATE, DRY
     kept = no_lateness()
     for row in rows:
-        follow_lateness(row, 4.0 * float(np.mean(rows[:, E] ** 2)), False, kept)
+        follow_lateness(row, 4.0 * float(np.mean(rows[:, E] ** 2)), False, True, False, kept)
 
     assert kept[TAU] == 0.0
     assert not is_late(kept)
+
+
+@pytest.mark.parametrize(("anew", "expected"), [(True, -0.6), (False, 0.0)])
+def test_what_a_healthy_rig_usually_leaves_is_left_if_the_motion_has_just_become_known(
+    anew, expected
+) -> None:
+    # A rig that its equations describe less well: half of its largest residual is usual.
+    healthy = 1.05 * np.sin(5.3 * AT + 0.3)
+    kept, largest = no_lateness(), 2.0 * float(np.mean(healthy**2))
+    rows = np.zeros((N, len(COLUMNS)))
+    rows[:, E], rows[:, LATE_UNIT] = healthy - 0.6 * LATE, LATE
+    rows[:, DRY_UNIT] = np.sign(np.cos(AT))
+    for row in rows:
+        follow_lateness(row, largest, True, True, anew, kept)
+
+    assert kept[TAU] == pytest.approx(expected, abs=0.1)
+
+
+def test_what_was_seen_before_a_deviation_is_learnt_once_the_motion_is_known() -> None:
+    kept, row = no_lateness(), np.zeros(len(COLUMNS))
+    for late, dry in zip(LATE, DRY, strict=True):
+        row[E], row[LATE_UNIT], row[DRY_UNIT] = -0.5 * late, late, dry
+        follow_lateness(row, 1.0, True, True, False, kept)
+    assert kept[TAU] == 0.0
+
+    row[E] = 10.0
+    follow_lateness(row, NOISE**2, True, False, True, kept)
+
+    assert kept[TAU] == pytest.approx(-0.5, abs=0.01)
 
 
 def test_a_lateness_that_is_gone_is_forgotten() -> None:
@@ -80,6 +109,6 @@ def test_a_lateness_that_jumps_is_said_to_change() -> None:
     row = np.zeros(len(COLUMNS))
     for late in LATE[: round(SLOW / 4)]:
         row[E], row[LATE_UNIT] = 0.4 * late, late
-        follow_lateness(row, NOISE**2, False, kept)
+        follow_lateness(row, NOISE**2, False, True, False, kept)
 
     assert lateness_changes(kept)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
+from monitor.drives import BANDS
 from monitor.model import HealthyLimits, RigModel
 from monitor.observer import Extremes, SpectralWidth, Spectrum, UsualError, steady_motion
 from monitor.observer.lagged_motion import FIRST, WHOLE
@@ -103,7 +104,11 @@ def driven(seen: Spectrum, pace: float = SINE_PACE) -> np.ndarray:
 
 
 def usual(seen: Spectrum, pace: float = SINE_PACE) -> np.ndarray:
-    return UsualError(limits(), RATE).update(seen, driven(seen, pace))[0]
+    return UsualError(limits(), RATE).update(seen, driven(seen, pace), no_drive(seen))[0]
+
+
+def no_drive(seen: Spectrum) -> np.ndarray:
+    return np.zeros((seen.pace.size, BANDS))
 
 
 @pytest.mark.parametrize("frequency", [8.0, 8.1])
@@ -122,7 +127,7 @@ def test_a_smaller_motion_of_the_same_kind_leaves_no_more(ratio: float) -> None:
     windows = {"steady_shorts": (3.0,), "steady_mediums": (2.0,), "steady_frictions": (4.0,)}
     known = structs.replace(limits(), **windows)
 
-    found = UsualError(known, RATE).update(seen, driven(seen))[:, SETTLED:]
+    found = UsualError(known, RATE).update(seen, driven(seen), no_drive(seen))[:, SETTLED:]
 
     assert np.isinf(found[0]).all()
     energy = ratio**-2
@@ -138,7 +143,19 @@ def test_a_motion_recorded_at_its_own_size_is_compared_with_that() -> None:
         larger[name] = 2 * getattr(known, name)
     both = structs.replace(known, **larger)
 
-    assert np.all(UsualError(both, RATE).update(seen, driven(seen))[0, SETTLED:] == KNOWN)
+    found = UsualError(both, RATE).update(seen, driven(seen), no_drive(seen))[0]
+    assert np.all(found[SETTLED:] == KNOWN)
+
+
+@pytest.mark.parametrize(("volts", "expected"), [(1.0, KNOWN), (1.5, np.inf)])
+def test_a_larger_motion_leaves_no_more_under_the_drive_that_was_recorded(volts, expected) -> None:
+    seen = spectrum(8.0, 0.3)
+    bands = np.tile([0.0, 0.1, 0.3, 0.1, 0.0, 0.0, 0.0], (seen.pace.size, 1))
+    known = structs.replace(limits(), steady_motion_bands=tuple(bands[0].tolist()))
+
+    found = UsualError(known, RATE).update(seen, driven(seen), volts**2 * bands)[0]
+
+    assert np.all(found[SETTLED:] == expected)
 
 
 def test_a_motion_by_another_drive_has_none() -> None:
@@ -148,7 +165,8 @@ def test_a_motion_by_another_drive_has_none() -> None:
 def test_a_model_file_without_drives_knows_the_motion_by_any() -> None:
     seen, older = spectrum(8.0), structs.replace(limits(), steady_drives=())
 
-    found = UsualError(older, RATE).update(seen, driven(seen, TRIANGLE_PACE))[0]
+    pace = driven(seen, TRIANGLE_PACE)
+    found = UsualError(older, RATE).update(seen, pace, no_drive(seen))[0]
 
     assert np.all(found[SETTLED:] == KNOWN)
 
@@ -171,8 +189,9 @@ def test_any_cut_gives_the_same_limit() -> None:
     seen = spectrum(np.where(np.arange(3072) < 1536, 8.0, 11.0))
     cut, whole = UsualError(limits(), RATE), usual(seen)
 
+    drive = driven(seen), no_drive(seen)
     parts = [
-        cut.update(Spectrum(*(figure[a:b] for figure in seen)), driven(seen)[a:b])[0]
+        cut.update(Spectrum(*(figure[a:b] for figure in seen)), *(each[a:b] for each in drive))[0]
         for a, b in pairwise((0, 1, 9, 1500, 1540, 3072))
     ]
 
@@ -185,7 +204,7 @@ def without_lasting() -> RigModel:
     assert healthy is not None
     bare = structs.replace(
         healthy, steady_paces=(), steady_sizes=(), steady_narrow=(), steady_drives=(),
-        steady_energies=(),
+        steady_energies=(), steady_motion_bands=(),
         steady_shorts=(), steady_mediums=(), steady_frictions=(),
     )  # fmt: skip
     return structs.replace(model(), healthy=bare)
