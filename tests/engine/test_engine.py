@@ -2,14 +2,17 @@
 
 import numpy as np
 import pytest
+import scipy.interpolate
 import scipy.signal
 from msgspec.structs import replace
 
 from rigwatch.physics.engine.compile.compiled_system import compile_system
+from rigwatch.physics.engine.compile.step_size import pace
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.expression_dimension import dimension
 from rigwatch.physics.engine.equations.model import Model, shipped_models
 from rigwatch.physics.engine.equations.quantities import spelt_out
+from rigwatch.physics.engine.equations.scope import symbol
 from rigwatch.physics.engine.equations.system import Placement, compose
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.physics.engine.fit.windowed_fit import evaluate, fit
@@ -113,6 +116,19 @@ def test_a_delay_shifts_and_leaves_the_signal_whole(samples):
     time = np.arange(SAMPLES) * DT
     shifted = np.interp(time - samples * DT, time, whole)
     assert np.abs(late - shifted).max() < 2e-3 * np.abs(whole).max()
+
+
+def test_a_delay_of_a_small_part_of_a_sample_shifts_as_much_and_takes_few_steps():
+    tau = 0.05 * DT
+    system = compose(MASS_SPRING_DAMPER, [Placement("delay", ready("delay"), "position_sensor")])
+    given, u = {**TRUE, "position_sensor_delay_tau": tau}, excitation()
+    late = simulated(compile_system(system), given, u).outputs[:, 0]
+    whole = simulated(compile_system(compose(MASS_SPRING_DAMPER)), TRUE, u).outputs[:, 0]
+    time = np.arange(SAMPLES) * DT
+    moved = scipy.interpolate.CubicSpline(time, whole)(time - tau) - whole
+    assert np.abs(late - whole - moved)[1:].max() < 0.02 * np.abs(moved).max()
+    values = {symbol(n): given.get(n, p.value) for n, p in system.parameters.items()}
+    assert max(abs(float(rate.subs(values))) for rate in pace(system).asked) * DT <= 50.001
 
 
 def test_simulation_agrees_with_the_closed_form():
