@@ -270,7 +270,8 @@ def _least_share(bench: Bench, known: Combination) -> float:
 def next_candidates(bench: Bench, known: Combination) -> list[Ranked]:
     """The effects that match the residual of a set best."""
     every = _scored_with(bench, known)
-    return select_for_fit(every, "dynamic" if bench.study.model.states else "static")[:BRANCHES]
+    kind = "dynamic" if bench.study.model.states else "static"
+    return select_for_fit(every, kind, at_floor=False)[:BRANCHES]
 
 
 def _scored_with(bench: Bench, known: Combination) -> list[Ranked]:

@@ -154,7 +154,8 @@ def _explaining_all(
     """Labels of accepted effects, no less simple, that leave less of all recordings than the best.
 
     While much remains, that one effect leads on the few recordings held out and another on all of
-    them is chance: what is missing beside them may favour either.
+    them is chance: what is missing beside them may favour either. Members of the best's class, and
+    those that lead on both and are passed over for a simpler effect, are no such rivals.
     """
     assert best.fitted is not None
     if explains(base, best, floor):
@@ -167,6 +168,8 @@ def _explaining_all(
         and row.accepted
         and row.fitted is not None
         and row.free <= best.free
+        and row.held_out_error >= best.held_out_error
+        and row.label not in best.alike
         and not _same_family(best, row)
         and _energy(row.fitted) < least
     )

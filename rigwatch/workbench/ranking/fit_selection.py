@@ -5,13 +5,21 @@ from collections.abc import Sequence
 from rigwatch.workbench.ranking.ranked import Ranked
 
 LEVEL = 0.01
-"""Corrected p-value below which an effect is fitted."""
+"""p-value below which an effect is fitted."""
 MOST_FITS = {"static": 24, "dynamic": 6}
 
 
-def select_for_fit(rows: Sequence[Ranked], kind: str) -> list[Ranked]:
-    """The best significant effects, including the best of each kind of port."""
-    likely = [row for row in rows if row.p_value < LEVEL]
+def select_for_fit(rows: Sequence[Ranked], kind: str, *, at_floor: bool) -> list[Ranked]:
+    """The best significant effects, including the best of each kind of port.
+
+    Args:
+        rows: best first.
+        kind: of the model, a key of `MOST_FITS`.
+        at_floor: whether the model leaves only noise. If it leaves more, something is missing, and
+            each effect counts that is significant by itself, without the correction for the number
+            of candidates: slow residuals have few degrees of freedom, and held-out data decide.
+    """
+    likely = [row for row in rows if (row.p_value if at_floor else row.p_alone) < LEVEL]
     kept_rows: dict[str, Ranked] = {}
     for row in likely:
         similar = _fitted_instead(row, kept_rows, likely)

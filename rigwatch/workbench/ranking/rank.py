@@ -60,7 +60,8 @@ def rank(
         if row.port in denied:
             row.reason = row.failure = denied[row.port]
     kind = "dynamic" if study.model.states else "static"
-    chosen = select_for_fit([row for row in rows if not row.failure], kind)
+    possible = [row for row in rows if not row.failure]
+    chosen = select_for_fit(possible, kind, at_floor=floor.reached(base.held_out))
     enough = fit_each(study, data, base, floor, chosen, progress)
     if not enough:
         least = AGAIN * floor.above(base.train)
