@@ -8,8 +8,8 @@ STAMPS := $(VENV)/stamps
 export NUMBA_CACHE_DIR ?= $(CURDIR)/.numba_cache
 # Each test worker has a core: threads of the linear algebra would only wait for each other.
 export OPENBLAS_NUM_THREADS ?= 1
-# One worker more than cores, as many tests wait for devices and pages.
-WORKERS ?= $(shell cores=$$(nproc 2>/dev/null || echo 2); echo $$((cores < 3 ? cores + 1 : 4)))
+# Two workers a core, four at most, as many tests wait for devices and pages.
+WORKERS ?= $(shell cores=$$(nproc 2>/dev/null || echo 2); echo $$((cores < 2 ? 2 : 4)))
 export PATH := $(abspath $(VENV)/bin):$(PATH)
 
 # Measured data, where they lie beside the checkout.
