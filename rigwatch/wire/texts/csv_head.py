@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from rigwatch.wire.texts.headers import read_header
 from rigwatch.wire.texts.written_times import time_style
-from rigwatch.wire.units import UnitError, in_table_words, unit_of
+from rigwatch.wire.units import in_table_words, is_unit
 
 DELIMITERS = ";\t,"
 """Delimiters, in the order in which they are tried."""
@@ -97,15 +97,7 @@ def _with_units(names: Sequence[str], units: Sequence[str] | None) -> list[str]:
 def _are_units(row: Sequence[str]) -> bool:
     """Whether a line holds units only, at least one."""
     told = [cell.strip("[]() ") for cell in row if cell not in _NOTHING]
-    return bool(told) and all(map(_is_unit, told))
-
-
-def _is_unit(text: str) -> bool:
-    try:
-        unit_of(in_table_words(text))
-    except UnitError:
-        return False
-    return True
+    return bool(told) and all(is_unit(in_table_words(text)) for text in told)
 
 
 def _is_data(row: Sequence[str]) -> bool:

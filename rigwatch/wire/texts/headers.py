@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from rigwatch.wire.units import UnitError, in_table_words, unit_of
+from rigwatch.wire.units import in_table_words, is_unit
 
 _BRACKETED = re.compile(r"\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()\[\]]*)\)")
 _SEPARATED = re.compile(r"[\s_.\-]+")
@@ -36,11 +36,11 @@ def read_header(column: str) -> Header:
     """Name and possible units from a header."""
     bracketed = [in_table_words(text) for text in _bracketed(column)]
     plain = _BRACKETED.sub(" ", column).strip()
-    if known := next(filter(_known, bracketed), None):
+    if known := next(filter(is_unit, filter(None, bracketed)), None):
         return Header(column, _plain(plain), (known,))
     words = [word for word in _SEPARATED.split(plain) if word]
     for first in range(1, len(words)):
-        if units := tuple(filter(_known, _units(words[first:]))):
+        if units := tuple(filter(is_unit, _units(words[first:]))):
             return Header(column, _plain("_".join(words[:first])), units)
     return Header(column, _plain(plain), (), next(filter(None, _bracketed(column)), ""))
 
@@ -73,14 +73,4 @@ def _units(words: list[str]) -> Iterator[str]:
 def _powered(word: str) -> str:
     """`s2` is s^2; words that are units already stay."""
     found = _POWER.match(word)
-    return f"{found['unit']}^{found['power']}" if found and not _known(word) else word
-
-
-def _known(unit: str) -> bool:
-    if not unit:
-        return False
-    try:
-        unit_of(unit)
-    except UnitError:
-        return False
-    return True
+    return f"{found['unit']}^{found['power']}" if found and not is_unit(word) else word

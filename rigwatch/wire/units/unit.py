@@ -93,6 +93,15 @@ def unit_of(text: str) -> Unit:
     return Unit(si, dimension, factor)
 
 
+def is_unit(text: str) -> bool:
+    """Whether `text` names a unit."""
+    try:
+        unit_of(text)
+    except UnitError:
+        return False
+    return True
+
+
 def _plainly(text: str) -> str:
     """The text with superscripts and look-alike characters replaced by plain ones."""
     raised = re.sub("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda m: "^" + m[0].translate(_RAISED), text.strip())

@@ -8,7 +8,7 @@ from fractions import Fraction
 from rigwatch.physics.engine.equations import Input, Model, Output
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.texts import Header, read_header
-from rigwatch.wire.units import UnitError, may_count_turns, unit_of
+from rigwatch.wire.units import is_unit, may_count_turns, unit_of
 
 TIMES = ("time", "t", "timestamp", "time_stamp", "seconds", "sec")
 """Names of a time column."""
@@ -181,20 +181,12 @@ def _given(
         own, told = _unit(header, channel, signal)
         return f"{header.column}[{own}]", told
     unit = _GIVEN_UNIT.search(text)
-    if unit is None or not _known(unit[1]):
+    if unit is None or not is_unit(unit[1]):
         return text, []
     turns = _as_turns(unit[1], signal.shown or signal.unit)
     if not turns:
         return text, []
     return f"{text[: unit.start()]}[{turns}]", [f"{text}: {unit[1]} is read as {turns}"]
-
-
-def _known(unit: str) -> bool:
-    try:
-        unit_of(unit)
-    except UnitError:
-        return False
-    return True
 
 
 def _no_unit(header: Header, option: str) -> str:
