@@ -15,7 +15,7 @@ from rigwatch.physics.engine.compile.compiled_system import (
 )
 from rigwatch.physics.engine.compile.derivatives import derivative
 from rigwatch.physics.engine.compile.integrator import across, call, lateness, place
-from rigwatch.physics.engine.compile.resolved_rates import resolved
+from rigwatch.physics.engine.compile.resolved_rates import resolved, resolved_from
 from rigwatch.physics.engine.compile.stability import even_substeps
 from rigwatch.physics.engine.compile.static_kernel import evaluated, numpy_function
 from rigwatch.physics.engine.compile.step_size import INSTANT
@@ -38,6 +38,7 @@ __all__ = [
     "on_all_cores",
     "place",
     "resolved",
+    "resolved_from",
     "shares",
     "side_by_side",
     "together",

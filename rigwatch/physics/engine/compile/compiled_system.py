@@ -10,7 +10,12 @@ import sympy
 
 from rigwatch.physics.engine.compile.kernel import native_kernel
 from rigwatch.physics.engine.compile.static_kernel import StaticKernel
-from rigwatch.physics.engine.compile.step_size import FINEST, constant_rates, steps_for
+from rigwatch.physics.engine.compile.step_size import (
+    FINEST,
+    constant_rates,
+    fastest_of,
+    steps_for,
+)
 from rigwatch.physics.engine.equations import System
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
@@ -107,6 +112,14 @@ class CompiledSystem:
         last = np.empty((len(starts), len(self.system.states)))
         self.kernel.simulate(*arguments, outputs, slopes, last, rows, finest)
         return Simulation(outputs, slopes, last)
+
+    def fastest(self, parameters: FloatArray) -> float:
+        """The largest of the model's constant rates; 0 without any [1/s].
+
+        Args:
+            parameters: all of them, shape (n_p,).
+        """
+        return fastest_of(self.system, self._rates, parameters)
 
     @cached_property
     def _rates(self) -> tuple[sympy.Expr, ...]:

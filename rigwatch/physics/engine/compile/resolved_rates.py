@@ -14,10 +14,12 @@ import sympy
 from msgspec import structs
 
 from rigwatch.physics.engine.compile.static_kernel import numpy_function
-from rigwatch.physics.engine.compile.step_size import INSTANT, constant_rates
+from rigwatch.physics.engine.compile.step_size import INSTANT, constant_rates, fastest_of
 from rigwatch.physics.engine.equations import Parameter, System
 from rigwatch.wire.arrays import FloatArray
 
+ROUNDING = 1.0 + 1e-9
+"""Ratio by which a rate beyond the limit may still grow, so that it is between its own bounds."""
 HALVINGS = 60
 """Steps of the search for a bound."""
 
@@ -26,7 +28,7 @@ def resolved(system: System, parameters: FloatArray, spacing: float) -> System:
     """The system with bounds of free parameters that keep its constant rates resolved.
 
     Only rates that depend on one free parameter set a bound: with two, the bound of one would
-    depend on the other. A model that starts beyond the limit is left as it is.
+    depend on the other, see `resolved_from`. A model that starts beyond the limit is left as it is.
 
     Args:
         system: the equations.
@@ -42,6 +44,29 @@ def resolved(system: System, parameters: FloatArray, spacing: float) -> System:
     return replace(system, parameters=bounded)
 
 
+def resolved_from(system: System, parameters: FloatArray, spacing: float) -> System:
+    """The system bounded to a part of what its constant rates may still grow by.
+
+    A rate may grow by the same ratio with each of its free parameters, and reaches the limit if
+    all of them are at their bounds. A fit that ends there may go on from there. A rate beyond the
+    limit does not grow.
+
+    Args:
+        system, parameters, spacing: as in `resolved`.
+    """
+    bounded = dict(system.parameters)
+    for rate in constant_rates(system):
+        names = sorted({str(each) for each in rate.free_symbols} & set(system.free))
+        reached = spacing * fastest_of(system, (rate,), parameters)
+        if names and 0.0 < reached < np.inf:
+            limit = reached * (max(INSTANT / reached, ROUNDING) ** (1.0 / len(names)))
+            for name in names:
+                bounded[name] = _bounded(
+                    system, bounded[name], name, rate, parameters, spacing, limit
+                )
+    return replace(system, parameters=bounded)
+
+
 def _bounded(  # noqa: PLR0917 -- they belong together
     system: System,
     parameter: Parameter,
@@ -49,6 +74,7 @@ def _bounded(  # noqa: PLR0917 -- they belong together
     rate: sympy.Expr,
     parameters: FloatArray,
     spacing: float,
+    limit: float = INSTANT,
 ) -> Parameter:
     """A parameter with the bounds at which the rate reaches the limit."""
     function = numpy_function(tuple(system.parameters), (rate,))
@@ -56,7 +82,7 @@ def _bounded(  # noqa: PLR0917 -- they belong together
 
     def too_fast(value: float) -> bool:
         found = function(*np.concatenate([parameters[:index], [value], parameters[index + 1 :]]))[0]
-        return not abs(float(found)) * spacing <= INSTANT
+        return not abs(float(found)) * spacing <= limit
 
     start = float(np.clip(parameters[index], parameter.low, parameter.high))
     if too_fast(start):

@@ -89,14 +89,23 @@ def steps_for(
         parameters: all of them, shape (n_p,).
         spacing: time between samples [s].
     """
-    if not rates:
-        return 1
-    found = np.abs(numpy_function(tuple(system.parameters), rates)(*parameters))
-    fastest = float(np.nanmax(found)) * spacing
+    fastest = fastest_of(system, rates, parameters) * spacing
     steps = max(math.ceil(min(fastest / DECAYING, FINEST)), 1)
     while steps < FINEST and _decay_error(fastest, steps) > DECAY_ERROR:
         steps += 1
     return steps
+
+
+def fastest_of(system: System, rates: tuple[sympy.Expr, ...], parameters: FloatArray) -> float:
+    """The largest of the model's constant rates; 0 without any [1/s].
+
+    Args:
+        system, rates, parameters: as in `steps_for`.
+    """
+    if not rates:
+        return 0.0
+    found = np.abs(numpy_function(tuple(system.parameters), rates)(*parameters))
+    return float(np.nanmax(found))
 
 
 def _decay_error(decay: float, steps: int) -> float:

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import CompiledSystem, Simulation
+from rigwatch.physics.engine.compile import INSTANT, CompiledSystem, Simulation
 from rigwatch.physics.engine.fit.initial_state_projection import Tangent
 from rigwatch.physics.engine.fit.recorded_effect_states import RecordedEffectStates
 from rigwatch.physics.engine.fit.recording import Recording, cut_for, initial_states, shown_states
@@ -117,7 +117,7 @@ class Problem:
         self._unknown = np.setdiff1d(self._every, known)
         shown = shown_states(system)
         self.hidden = np.array([i for i in self._unknown if i not in shown], np.int64)
-        self._told = False
+        self._told, self.unresolved, self._fastest = False, False, math.inf
         self._low, self._high = (
             np.array([getattr(state, end) for state in system.states.values()])
             for end in ("low", "high")
@@ -152,6 +152,15 @@ class Problem:
         """Set the initial values of some states in some windows."""
         self.initial = self.initial.copy()
         self.initial[np.ix_(rows, columns)] = values
+
+    def resolve_rates(self, parameters: FloatArray) -> None:
+        """From now on keep the model's modes as slow as the recording resolves.
+
+        Those of a model that is faster at these parameters become no faster.
+        """
+        self.unresolved = False
+        reached = self.compiled.fastest(parameters) * self.recording.dt
+        self._fastest = max(INSTANT, reached)
 
     def hold(self, initial: FloatArray, columns: IntArray) -> None:
         """Set the initial states of windows and fix some of the states."""
@@ -388,7 +397,13 @@ class Problem:
         return self._last[1]
 
     def tried(self, parameters: FloatArray) -> FloatArray:
-        """Residuals for the solver; NaN if the simulation diverges, and the solver steps back."""
+        """Residuals for the solver; NaN if the simulation diverges, and the solver steps back.
+
+        The same where a mode becomes too fast for the recording to resolve.
+        """
+        if self.compiled.fastest(parameters) * self.recording.dt > self._fastest:
+            self.unresolved = True
+            return np.full(self.count, np.nan)
         before = self.initial
         try:
             return self.projected(parameters)[0]

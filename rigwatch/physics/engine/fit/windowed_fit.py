@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from rigwatch.physics.engine.compile import CompiledSystem
+from rigwatch.physics.engine.compile import CompiledSystem, resolved_from
 from rigwatch.physics.engine.equations import System
 from rigwatch.physics.engine.fit.continued_windows import continued
 from rigwatch.physics.engine.fit.problem import STEPS, Problem, Started
@@ -19,6 +19,9 @@ from rigwatch.wire.errors import ModelError
 
 ROUNDS = 2
 """Most solver runs, each started from the last result, while diverged windows recover."""
+
+NEARER = 4
+"""Most solver runs towards modes that are as fast as the recording resolves."""
 
 FAR, CLOSE = 100.0, 0.01
 """Start of a search, and smallest step worth a simulation, in standard deviations."""
@@ -130,23 +133,44 @@ def fit(
     problem.recall(problem.whole(begin, theta))
     found = problem.start_windows(problem.whole(begin, theta))
     for _ in range(ROUNDS if len(theta) else 0):
-        theta = _smallest_error(problem, begin, theta, prior)
+        theta = _resolved_minimum(problem, begin, theta, prior)
         found = problem.start_windows(problem.whole(begin, theta))
         if not found.came_back:
             break
     return result_of(problem, found)
 
 
-def _smallest_error(
+def _resolved_minimum(
     problem: Problem, begin: FloatArray, theta: FloatArray, prior: Prior | None
 ) -> FloatArray:
-    """Free parameters at which SciPy's solver ends.
+    """Free parameters of the smallest error among those whose modes the recording resolves."""
+    problem.resolve_rates(problem.whole(begin, theta))
+    theta = _smallest_error(problem, begin, theta, prior, bounds(problem.system))
+    for _ in range(NEARER):
+        if not problem.unresolved:
+            break
+        # The solver stops short of a limit that is none of its bounds.
+        here = problem.whole(begin, theta)
+        problem.resolve_rates(here)
+        within = bounds(resolved_from(problem.system, here, problem.recording.dt))
+        theta = _smallest_error(problem, begin, theta, prior, within)
+    return theta
+
+
+def _smallest_error(
+    problem: Problem,
+    begin: FloatArray,
+    theta: FloatArray,
+    prior: Prior | None,
+    within: tuple[FloatArray, FloatArray],
+) -> FloatArray:
+    """Free parameters at which SciPy's solver ends, between the lower and upper bounds `within`.
 
     The solver's unknowns are scaled by the standard deviations at the start. Its step tolerance is
     relative to the norm of the unknowns, so they are offset to `FAR`, which makes a step of `CLOSE`
     standard deviations small.
     """
-    low, high = bounds(problem.system)
+    low, high = within
     unit = _deviations(*problem.projected(problem.whole(begin, theta)), theta)
 
     def parameters(moved: FloatArray) -> FloatArray:

@@ -6,8 +6,11 @@ other samples are limited. There a fit has converged although its gradient does 
 a smooth valley, however narrow, a short enough step keeps its promise.
 """
 
+import math
+
 import numpy as np
 
+from rigwatch.physics.engine.compile import INSTANT
 from rigwatch.physics.engine.fit import Fit, Recording, bounds, error_at
 from rigwatch.physics.engine.search.convergence import (
     PROMISED,
@@ -32,8 +35,13 @@ def kept_promise(fitted: Fit, recording: Recording, horizon: int, substeps: int)
     if promised <= PROMISED:
         return promised
 
+    system = fitted.compiled
+    resolved = max(INSTANT, system.fastest(fitted.parameters) * recording.dt)
+
     def size(parameters: FloatArray) -> float:
-        system = fitted.compiled
+        # A fit goes no further than the recording resolves.
+        if system.fastest(parameters) * recording.dt > resolved:
+            return math.inf
         return error_at(system, recording, horizon, parameters, fitted.scale, substeps) ** 2
 
     here, step = size(fitted.parameters), _gauss_newton_step(fitted)

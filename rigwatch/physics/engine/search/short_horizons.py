@@ -20,7 +20,7 @@ from functools import partial
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import CompiledSystem
+from rigwatch.physics.engine.compile import INSTANT, CompiledSystem
 from rigwatch.physics.engine.fit import Fit, Recording, error_at, fit
 from rigwatch.physics.engine.search.convergence import PROMISED, spread
 from rigwatch.physics.engine.search.drawn_starts import drawn_start
@@ -41,6 +41,8 @@ STANDS_IN = 2.0
 for what the model lacks, and other starts are tried."""
 DRAWN = 4
 """Most random starts."""
+DRAWS = 100
+"""Most values drawn for one of them, until the recording resolves the model's modes."""
 DEAR = 1_500_000
 """Integrated numbers per simulation above which no random starts are tried."""
 LONG = 2000
@@ -122,8 +124,17 @@ class ShortHorizons:
         if self._numbers() < DEAR:
             generator = np.random.default_rng(0)
             for _ in range(DRAWN):
-                drawn = drawn_start(self.compiled.system, begin, generator)
-                yield "drawn values", drawn, longer or growing
+                yield "drawn values", self._drawn(begin, generator), longer or growing
+
+    def _drawn(self, begin: FloatArray, generator: np.random.Generator) -> FloatArray:
+        """A random start at which the recording resolves the model's modes, if one is found."""
+        compiled, spacing = self.compiled, self.recording.dt
+        resolved = max(INSTANT, compiled.fastest(begin) * spacing)
+        for _ in range(DRAWS):
+            found = drawn_start(compiled.system, begin, generator)
+            if compiled.fastest(found) * spacing <= resolved:
+                break
+        return found
 
     def _attempt(self, name: str, start: FloatArray, first: Sequence[int]) -> Attempt:
         if first:
