@@ -170,6 +170,15 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         _AT_ONCE,
     ),
     AlarmKind(
+        "certificates_end",
+        "error",
+        "certificates end within a month, or have ended: the next restart of router or machine "
+        "would leave the rig unwatched",
+        "Issue them anew with `rigwatch keys issue`. Processes on this machine take them up "
+        "without a restart; copy those of other machines there before `register.json`.",
+        _AT_ONCE,
+    ),
+    AlarmKind(
         "monitor_reset",
         "error",
         "a filter of the monitor diverged and was reset",
@@ -383,6 +392,7 @@ REPORTED = frozenset(
     (
         "link", "stale", "duplicate_source", "loss", "line_noise", "slow_device", "clock_drift",
         "clock_wrong", "disk", "disk_almost_full", "recording_stopped", "estimates_missing",
+        "certificates_end",
     )
 )  # fmt: skip
 """Alarms whose conditions processes report without a sample."""

@@ -17,6 +17,7 @@ from monitor.model import RigModel, load_model
 from monitor.pipeline import RigMonitor, compile_kernels
 from monitor.process.cursor import Cursor
 from monitor.process.health import HealthBook
+from monitor.process.key_watch import KeyWatch
 from monitor.process.link_watch import LinkWatch, Seen, device_reports, disk_reports
 from monitor.process.model_requests import ModelDesk, Place
 from monitor.process.operator_desk import OperatorDesk
@@ -82,6 +83,7 @@ class MonitorProcess:
         self._done = self._cursor.read() if self._cursor else None
         self._stale_after = config.stale_after
         self._links = LinkWatch(self._stale_after)
+        self._keys = KeyWatch(config.bus.security.keys)
         self._health = HealthBook("monitor")
         self._device = config.daq.name
         self._patience = Patience(time.monotonic())
@@ -168,6 +170,7 @@ class MonitorProcess:
         failure = self._journal.failure if self._journal else ""
         recorder_there = self._recorder_presence.holds(time.monotonic())
         yield from disk_reports(seen, self._recorder, recorder_there, failure)
+        yield from self._keys.reports(seen)
 
     def _announce_router(self, seen: Seen) -> None:
         """Report to subscribers that the router was unavailable."""

@@ -8,6 +8,7 @@ import time
 
 import msgspec
 
+from rigwatch.wire.access import out_of_force
 from rigwatch.wire.bus import (
     MOST_COMMANDS,
     Bus,
@@ -63,7 +64,7 @@ class Witness:
         now: float,
         security: SecuritySection | None = None,
     ) -> None:
-        security = security or SecuritySection()
+        self._security = security = security or SecuritySection()
         self.settings, self._bus = settings, bus
         bus.announce()
         self._announcer = Announcer(settings, bus.rig)
@@ -84,7 +85,9 @@ class Witness:
         if self._estimates.drain():
             self._heard_at = now
         silent = now - self._heard_at
-        for alarm in self._stale.judge(silent > self._stale_after, silent, t_ns):
+        for alarm in self._stale.judge(
+            silent > self._stale_after, silent, t_ns, self._link_trouble
+        ):
             self._bus.publish(ALARMS, alarm)
         self._obey(t_ns)
         for alarm in self._alarms.drain():
@@ -93,6 +96,13 @@ class Witness:
         if now - self._told_at >= 1.0:
             self._told_at = now
             self._report(now, t_ns)
+
+    def _link_trouble(self) -> str:
+        """Why nothing is heard: no router, perhaps since certificates have ended."""
+        if self._bus.connected():
+            return ""
+        ended = out_of_force(self._security, PROCESS)
+        return "the router does not answer" + (f": {ended}" if ended else "")
 
     def _hear(self, alarm: Alarm, now: float) -> None:
         self._announcer.hear(alarm, now)

@@ -43,7 +43,7 @@ def heard_from(senders: dict[str, Bus], receiver: Bus) -> set[str]:
     return users
 
 
-def test_a_revocation_and_a_new_certificate_are_in_force_without_a_restart(
+def test_a_revocation_a_new_and_a_renewed_certificate_are_in_force_without_a_restart(
     rig: SecuredRig,
 ) -> None:
     senders = {name: rig.bus(f"ack-{name}", rig.of(name)) for name in ("ann", "bob")}
@@ -60,12 +60,15 @@ def test_a_revocation_and_a_new_certificate_are_in_force_without_a_restart(
     Authority(rig.keys).issue("carl", "operator")
     senders["carl"] = rig.bus("ack-carl", rig.of("carl"))
     eventually(lambda: heard_from(senders, monitor) == {"bob", "carl"}, "carl is heard")
+    Authority(rig.keys).issue("bob", "operator")
+    eventually(lambda: reloads() >= 3.0, "the register is read once more")
+    assert heard_from(senders, monitor) == {"bob", "carl"}
     (rig.keys / "register.json").write_text("{")
     assert "bob" in heard_from(senders, monitor)
 
 
 def test_refused_connections_and_denied_messages_are_counted_and_reported(
-    rig: SecuredRig, tmp_path: Path
+    rig: SecuredRig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     observer = rig.bus("recorder")
     healths, events = observer.subscribe(HEALTH), observer.subscribe(EVENTS)
@@ -93,6 +96,10 @@ def test_refused_connections_and_denied_messages_are_counted_and_reported(
     (tmp_path / "other.toml").write_text(rig.path.read_text().replace(str(rig.keys), str(other)))
     with pytest.raises(BusError, match="no router answers"):
         connect(load_rig(tmp_path / "other.toml"), "monitor", 0.5)
+    monkeypatch.setattr("rigwatch.keys.authority.CERTIFICATE_DAYS", -1 / 86_400)
+    Authority(rig.keys).issue("ann", "operator")
+    with pytest.raises(BusError, match=r"ann\.pem has ended on .*`rigwatch keys issue`"):
+        connect(rig.config, "ack", 0.5)
     eventually(lambda: counted("refused_connections") > refused, "the refusal is counted")
     eventually(lambda: any(e.code == "ACCESS REFUSED" for e in events.drain()), "an event")
 

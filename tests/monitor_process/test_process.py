@@ -3,16 +3,19 @@
 import threading
 import time
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
 from monitor.alarms import Occasion
 from monitor.pipeline.rig_monitor import RigMonitor
+from monitor.process.key_watch import KeyWatch
 from monitor.process.link_watch import LinkWatch, Seen
 from monitor.process.loop import MonitorProcess, suitable_model
-from rigwatch.wire.access import signer_of
+from rigwatch.wire.access import REGISTER, Issued, Register, signer_of
 from rigwatch.wire.bus.commands.alarm_command import command_alarms
 from rigwatch.wire.bus.commands.alarm_list import ask_alarm_list
 from rigwatch.wire.bus.commands.command_check import signed
@@ -349,6 +352,24 @@ def test_a_clock_that_was_set_is_noticed_and_one_that_runs_is_not() -> None:
     assert [watch.clock_step(seen(t, t)) for t in (0, 1, 2)] == [0, 0, 0]
     assert watch.clock_step(seen(3 - 30, 3)) == pytest.approx(-30e9)
     assert watch.clock_step(seen(4 - 30, 4)) == 0
+
+
+def test_certificates_that_end_are_an_alarm_until_they_are_issued_anew(tmp_path: Path) -> None:
+    watch, today = KeyWatch(str(tmp_path)), datetime(2026, 3, 1, tzinfo=UTC).timestamp()
+
+    def told(minutes: float, **ends: str) -> list[tuple[str, bool]]:
+        issued = tuple(Issued(name, name, 1, date) for name, date in ends.items())
+        (tmp_path / REGISTER).write_bytes(msgspec.json.encode(Register("bench", issued)))
+        found = watch.reports(seen(today, 60.0 * minutes))
+        return [(at.text, holds) for _, at, holds in found]
+
+    assert told(0, daq="2026-04-01", router="2028-01-01") == [("", False)]
+    assert told(1, daq="2026-03-31", router="2026-02-01") == [
+        ("router 2026-02-01, daq 2026-03-31", True)
+    ]
+    assert told(1.5) == [("router 2026-02-01, daq 2026-03-31", True)], "not read again yet"
+    assert told(2, daq="2028-03-01", router="2028-03-01") == [("", False)]
+    assert list(KeyWatch("").reports(seen(today, 0.0))) == []
 
 
 def test_the_recorders_troubles_are_alarms_and_clear(bench: Bench) -> None:

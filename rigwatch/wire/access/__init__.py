@@ -34,7 +34,14 @@ from rigwatch.wire.access.register import (
 )
 from rigwatch.wire.access.signing import Signer
 from rigwatch.wire.access.statement import names_a_person
-from rigwatch.wire.access.validity import days_left, ending_soon, endings_text, in_force
+from rigwatch.wire.access.validity import (
+    days_left,
+    ending_soon,
+    endings_text,
+    ends_text,
+    in_force,
+    out_of_force,
+)
 from rigwatch.wire.access.verifying import Verifier
 
 __all__ = [
@@ -53,10 +60,12 @@ __all__ = [
     "days_left",
     "ending_soon",
     "endings_text",
+    "ends_text",
     "in_force",
     "key_files",
     "names_a_person",
     "operator_name",
+    "out_of_force",
     "read_register",
     "signer_of",
     "tls_settings",

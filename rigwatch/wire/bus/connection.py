@@ -13,6 +13,7 @@ from rigwatch.wire.access import (
     access_settings,
     certificate_name,
     check_exposure,
+    out_of_force,
     signer_of,
     tls_settings,
 )
@@ -119,7 +120,13 @@ def connect(
     name = certificate_name(config.bus, process)
     tls = dict(tls_settings(config.bus, name))
     made = links.transport if links else _client
-    transport = made(config.bus.router, timeout, config.bus.lease, tls, stop)
+    try:
+        transport = made(config.bus.router, timeout, config.bus.lease, tls, stop)
+    except NoRouterError as error:
+        # The refusal of a certificate looks to a client as if nobody were there.
+        if why := out_of_force(config.bus.security, name):
+            raise NoRouterError(f"no connection to {config.bus.router}: {why}") from error
+        raise
     signer = signer_of(config.bus.security, name)
     megabytes = config.bus.ring_megabytes
     if links:
