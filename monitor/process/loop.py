@@ -24,14 +24,14 @@ from monitor.process.operator_desk import OperatorDesk
 from monitor.process.presence import Presence
 from monitor.process.startup_grace import Patience
 from monitor.signals import MONITOR_RESET
-from rigwatch.wire.bus import Bus, Close, CommandCheck, joined, serve_alarm_list
+from rigwatch.wire.bus import Bus, CommandCheck, joined, serve_alarm_list
 from rigwatch.wire.delivery import POSITION_WRONG, SampleReader
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.host import (
     MONITOR,
     Heartbeat,
+    Kept,
     both_clocks,
-    hold,
     prepare_for_real_time,
     raise_priority,
     set_at_signal,
@@ -79,7 +79,7 @@ class MonitorProcess:
         friction = FRICTION in section.detectors
         self.rig = RigMonitor(model, section.alarms, detectors, str(path), friction)
         self.bus = bus
-        self._give_up, self._journal, self._cursor = _opened(section.journal)
+        self._alone, self._journal, self._cursor = _opened(section.journal)
         self._done = self._cursor.read() if self._cursor else None
         self._stale_after = config.stale_after
         self._links = LinkWatch(self._stale_after)
@@ -211,7 +211,8 @@ class MonitorProcess:
         for kept in (self._journal, self._cursor):
             if kept:
                 kept.close()
-        self._give_up()
+        if self._alone:
+            self._alone.give_up()
 
     def _change_models(self) -> None:
         """Apply model changes; all samples read so far have been processed."""
@@ -291,6 +292,8 @@ class MonitorProcess:
         )
 
     def _tell_health(self, seen: Seen) -> None:
+        if self._alone:
+            self._alone.check()
         stale = seen.silent_s > max(1.0, self._stale_after)
         state = "unsuitable" if self._unsuitable else "stale" if stale else "running"
         text = self._unsuitable or ("no samples arrive" if stale else "")
@@ -308,18 +311,18 @@ class MonitorProcess:
         )
 
 
-def _opened(journal: str) -> tuple[Close, AlarmJournal | None, Cursor | None]:
+def _opened(journal: str) -> tuple[Kept | None, AlarmJournal | None, Cursor | None]:
     """Lock, journal and position at a path, all or none: a rig that cannot start keeps no file."""
     if not journal:
-        return lambda: None, None, None
+        return None, None, None
     with ExitStack() as opened:
-        give_up = hold(Path(f"{journal}.lock"), f"{journal}: alarm journal")
-        opened.callback(give_up)
+        alone = Kept(Path(f"{journal}.lock"), f"{journal}: alarm journal")
+        opened.callback(alone.give_up)
         kept = AlarmJournal(journal)
         opened.callback(kept.close)
         cursor = Cursor(f"{journal}.position")
         opened.pop_all()
-        return give_up, kept, cursor
+        return alone, kept, cursor
 
 
 def monitor_section(config: RigConfig, path: Path | str) -> MonitorSection:
