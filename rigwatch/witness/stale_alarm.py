@@ -13,6 +13,7 @@ from rigwatch.wire.messages import (
     Event,
     Identity,
 )
+from rigwatch.witness.kept_alarm import KeptAlarm
 
 _NONE = float("nan")
 
@@ -22,13 +23,15 @@ class StaleAlarm:
 
     Args:
         check: verifies the commands of operators.
+        kept: keeps the alarm over restarts.
 
     Attributes:
         standing: the alarm until estimates come again and somebody has acknowledged it, or None.
     """
 
-    def __init__(self, check: CommandCheck) -> None:
-        self.standing: Alarm | None = None
+    def __init__(self, check: CommandCheck, kept: KeptAlarm | None = None) -> None:
+        self._kept = kept or KeptAlarm()
+        self.standing = self._kept.read()
         self._check = check
 
     def judge(
@@ -57,6 +60,7 @@ class StaleAlarm:
 
     def _become(self, alarm: Alarm) -> Alarm:
         self.standing = None if alarm.state == "normal" else alarm
+        self._kept.write(self.standing)
         return alarm
 
     def command(self, command: AlarmCommand, t_ns: int) -> Iterator[Alarm | Event]:

@@ -19,6 +19,7 @@ from rigwatch.wire.messages import (
     EstimateBlock,
 )
 from rigwatch.wire.rig_config import SecuritySection, WitnessSection
+from rigwatch.witness.kept_alarm import KeptAlarm
 from rigwatch.witness.process import Witness
 from rigwatch.witness.stale_alarm import StaleAlarm
 from tests.bus.rig import TestRig, stopped
@@ -69,6 +70,24 @@ def test_a_monitor_that_is_not_heard_for_want_of_a_router_says_so() -> None:
     network.up = True
     (standing,) = ask_alarm_list(network.bus("r", "dashboard"))
     assert standing.cause.endswith("the router does not answer")
+
+
+def test_a_witness_that_is_killed_leaves_no_alarm_behind_and_hides_none(tmp_path: Path) -> None:
+    network, kept = MemoryNetwork(), KeptAlarm(tmp_path / "alarms.jsonl.stale")
+    monitor, page = network.bus("r", "monitor"), network.bus("r", "dashboard").subscribe(ALARMS)
+
+    bus = network.bus("r", "witness")
+    Witness(WitnessSection(), bus, 0.0, kept=kept).turn(31.0, 1)
+    bus.close()  # as the kernel does for a killed one
+    second = Witness(WitnessSection(), network.bus("r", "witness"), 0.0, kept=kept)
+    second.turn(0.1, 2)
+    assert [one.state for one in page.drain()] == ["unacknowledged"], "no estimate has come"
+    monitor.publish(ESTIMATES, estimates(0))
+    second.turn(0.2, 3)
+    assert [one.state for one in page.drain()] == ["cleared_unacknowledged"]
+    standing = kept.read()
+    assert standing is not None
+    assert standing.state == "cleared_unacknowledged"
 
 
 def test_a_silence_that_is_over_stands_until_somebody_has_seen_it(tmp_path: Path) -> None:
