@@ -26,10 +26,8 @@ class KeyWatch:
         self._text = ""
 
     def reports(self, seen: Seen) -> Iterator[tuple[str, Occasion, bool]]:
-        """Name, occasion and state of the alarm; nothing without keys."""
-        if not self._keys:
-            return
-        if self._due_ns is None or seen.monotonic_ns >= self._due_ns:
+        """Name, occasion and state of the alarm; without keys it never holds."""
+        if self._keys and (self._due_ns is None or seen.monotonic_ns >= self._due_ns):
             self._due_ns = seen.monotonic_ns + BETWEEN_NS
             self._text = self._checked(seen.t_ns)
         yield "certificates_end", occasion(seen, text=self._text), bool(self._text)

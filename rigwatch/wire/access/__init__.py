@@ -10,7 +10,7 @@ account_proof   the same without keys, with a secret of the account (`account_se
 proving         which of the two a rig uses
 """
 
-from rigwatch.wire.access.access_list import access_settings
+from rigwatch.wire.access.access_list import access_settings, alarm_roles
 from rigwatch.wire.access.certificates import (
     certificate_name,
     check_exposure,
@@ -54,6 +54,7 @@ __all__ = [
     "Signer",
     "Verifier",
     "access_settings",
+    "alarm_roles",
     "authority_file",
     "certificate_name",
     "check_exposure",
