@@ -8,7 +8,7 @@ import time
 
 import msgspec
 
-from rigwatch.wire.access import out_of_force
+from rigwatch.wire.access import keys_trouble
 from rigwatch.wire.bus import (
     MOST_COMMANDS,
     Bus,
@@ -105,7 +105,7 @@ class Witness:
         """Why nothing is heard: no router, perhaps since certificates have ended."""
         if self._bus.connected():
             return ""
-        ended = out_of_force(self._security, PROCESS)
+        ended = keys_trouble(self._security, PROCESS)
         return "the router does not answer" + (f": {ended}" if ended else "")
 
     def _hear(self, alarm: Alarm, now: float) -> None:

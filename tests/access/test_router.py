@@ -1,5 +1,6 @@
 """The router of a rig with keys follows the register, and counts what it refuses."""
 
+import shutil
 import threading
 import time
 from collections.abc import Iterator
@@ -10,9 +11,9 @@ import pytest
 from rigwatch.keys import Authority
 from rigwatch.router import RefusalLog
 from rigwatch.router.report import RouterReport
-from rigwatch.wire.bus import DENIED_MARK, REFUSED_MARK, Bus, connect
+from rigwatch.wire.bus import DENIED_MARK, REFUSED_MARK, Bus, connect, open_router
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
-from rigwatch.wire.errors import BusError
+from rigwatch.wire.errors import BusError, KeysError
 from rigwatch.wire.messages import ALARMS, COMMANDS, EVENTS, HEALTH, AlarmCommand, encode
 from rigwatch.wire.rig_config import load_rig
 from tests.access.secured_rig import SecuredRig, make_keys
@@ -130,3 +131,38 @@ def test_the_log_of_refusals_passes_everything_else_on() -> None:
     assert (log.connections, log.messages) == (1, 1)
     passed = log.take(b"y" * 70_000)
     assert len(passed) == 70_001
+
+
+@pytest.mark.parametrize(
+    ("damaged", "content", "words"),
+    [
+        ("router.key", "x", r"router\.key: found no private key in PEM"),
+        ("router.key", "daq.key", r"router\.key: found the key of another certificate"),
+        ("router.pem", "x", r"router\.pem: found no certificate in PEM"),
+        ("authority.pem", "x", r"authority\.pem: found no certificate in PEM"),
+    ],
+)
+def test_a_damaged_key_is_named_where_the_address_would_be_blamed(
+    damaged: str, content: str, words: str, keys: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "keys"
+    shutil.copytree(keys, folder)
+    source = keys / content
+    (folder / damaged).write_bytes(source.read_bytes() if source.is_file() else b"x")
+    config = SecuredRig(tmp_path, folder).config
+    with pytest.raises(KeysError, match=words):
+        open_router(config)
+
+
+@pytest.fixture(scope="module")
+def keys(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_keys(tmp_path_factory.mktemp("made") / "keys")
+
+
+def test_a_key_that_the_account_may_not_read_is_named(
+    keys: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("os.access", lambda path, _: Path(path).name != "daq.key")
+    config = SecuredRig(tmp_path, keys).config
+    with pytest.raises(KeysError, match=r"daq\.key: this account may not read it"):
+        connect(config, "daq", 0.1)

@@ -40,7 +40,7 @@ from rigwatch.wire.access.validity import (
     endings_text,
     ends_text,
     in_force,
-    out_of_force,
+    keys_trouble,
 )
 from rigwatch.wire.access.verifying import Verifier
 
@@ -64,9 +64,9 @@ __all__ = [
     "ends_text",
     "in_force",
     "key_files",
+    "keys_trouble",
     "names_a_person",
     "operator_name",
-    "out_of_force",
     "read_register",
     "signer_of",
     "tls_settings",

@@ -8,6 +8,7 @@ from datetime import UTC, date, datetime
 from pathlib import Path
 
 from rigwatch.wire.access.register import Issued, Register, authority_file, key_files
+from rigwatch.wire.errors import reason_of
 from rigwatch.wire.rig_config import SecuritySection
 
 SOON_DAYS = 30
@@ -43,34 +44,60 @@ def endings_text(endings: list[Issued]) -> str:
     return f"certificates end: {ends_text(endings)}; issue them anew with `rigwatch keys issue`"
 
 
-def out_of_force(security: SecuritySection, name: str) -> str:
-    """Why no link can be had with the certificate of `name`: what has ended or not yet begun.
+def keys_trouble(security: SecuritySection, name: str) -> str:
+    """Why no link can be had with the certificate of `name`: what is damaged, ended or not begun.
 
     Certificates of authority and router count too, as far as they are on this machine.
 
     Returns:
-        a sentence; "" if all are in force, cannot be read, or there are no keys.
+        a sentence; "" if nothing is wrong with them, or there are no keys.
     """
     if not security.keys:
         return ""
+    folder = Path(security.keys)
+    files = [authority_file(folder)]
+    for one in dict.fromkeys(("router", name)):
+        public, private = key_files(folder, one)
+        # A machine has the files of the names that run on it.
+        files += [public] * (public.is_file() or one == name)
+        if one == name and (why := _key_trouble(public, private)):
+            return why
+    return "; ".join(filter(None, map(_trouble, files)))
+
+
+def _trouble(path: Path) -> str:
+    """Why a certificate is not accepted now."""
     # Slow to import, and needed where a link fails only.
     from cryptography import x509
 
-    folder = Path(security.keys)
-    remedies = {
-        authority_file(folder): "make new keys with `rigwatch keys new`",
-        key_files(folder, "router")[0]: "issue it anew with `rigwatch keys issue`",
-        key_files(folder, name)[0]: "issue it anew with `rigwatch keys issue`",
-    }
-    found, now = [], datetime.now(UTC)
-    for path, remedy in remedies.items():
-        try:
-            certificate = x509.load_pem_x509_certificate(path.read_bytes())
-        except (OSError, ValueError):
-            continue
-        begin, end = certificate.not_valid_before_utc, certificate.not_valid_after_utc
-        if now > end:
-            found.append(f"{path} has ended on {end:%Y-%m-%d}: {remedy}")
-        elif now < begin:
-            found.append(f"{path} begins on {begin:%Y-%m-%d}: set this machine's clock")
-    return "; ".join(found)
+    try:
+        certificate = x509.load_pem_x509_certificate(path.read_bytes())
+    except OSError as error:
+        return f"{path}: certificate cannot be read: {reason_of(error)}"
+    except ValueError:
+        return f"{path}: found no certificate in PEM, expected one"
+    now, renewed = datetime.now(UTC), "issue it anew with `rigwatch keys issue`"
+    begin, end = certificate.not_valid_before_utc, certificate.not_valid_after_utc
+    if now < begin:
+        return f"{path} begins on {begin:%Y-%m-%d}: set this machine's clock"
+    return f"{path} has ended on {end:%Y-%m-%d}: {renewed}" if now > end else ""
+
+
+def _key_trouble(public: Path, private: Path) -> str:
+    """Why a private key cannot be used with its certificate."""
+    from cryptography import x509
+    from cryptography.hazmat.primitives.serialization import load_pem_private_key
+
+    try:
+        key = load_pem_private_key(private.read_bytes(), None)
+    except OSError as error:
+        return f"{private}: key cannot be read: {reason_of(error)}"
+    except (ValueError, TypeError):
+        return f"{private}: found no private key in PEM without a password, expected one"
+    try:
+        certificate = x509.load_pem_x509_certificate(public.read_bytes())
+    except (OSError, ValueError):
+        return ""  # said of the certificate
+    if certificate.public_key() != key.public_key():
+        return f"{private}: found the key of another certificate, expected that of {public}"
+    return ""
