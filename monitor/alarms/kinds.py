@@ -91,8 +91,9 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "duplicate_source",
         "critical",
-        "a second process sends samples of this device; those of the first are used",
-        "Find and stop it; a second daq needs a rig id of its own.",
+        "a second process or device sends samples of this rig; those of one are used",
+        "Find and stop it; a second daq needs a rig id of its own, a second device a line of its "
+        "own.",
         _AT_ONCE,
     ),
     AlarmKind(

@@ -286,7 +286,7 @@ class MonitorProcess:
             silent,
             self._daq_trouble if daq_there else "the daq process is not there",
             self.reader.heard,
-            self.reader.contested,
+            self.reader.contested or (self._daq is not None and self._daq.state == "two devices"),
             self._device,
             self.reader.position or (0, -1),
         )

@@ -395,6 +395,7 @@ def test_the_recorders_troubles_are_alarms_and_clear(bench: Bench) -> None:
     ("alarm", "state", "counters"),
     [
         ("line_noise", "garbage", {}),
+        ("duplicate_source", "two devices", {}),
         ("slow_device", "slow", {}),
         ("clock_drift", "running", {"drift_ppm": -600.0}),
         ("clock_wrong", "running", {"drift_ppm": 6000.0}),
