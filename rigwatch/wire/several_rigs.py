@@ -16,7 +16,7 @@ def load_rigs(paths: Sequence[Path]) -> list[tuple[Path, RigConfig]]:
     Raises:
         ConfigError: one is invalid, or two are of one rig on one router.
     """
-    return _apart([(path, load_rig(path)) for path in paths])
+    return apart([(path, load_rig(path)) for path in paths])
 
 
 def valid_rigs(
@@ -38,10 +38,15 @@ def valid_rigs(
     if say is not None:
         for mistake in mistakes:
             say(str(mistake))
-    return _apart(loaded)
+    return apart(loaded)
 
 
-def _apart(loaded: list[tuple[Path, RigConfig]]) -> list[tuple[Path, RigConfig]]:
+def apart(loaded: list[tuple[Path, RigConfig]]) -> list[tuple[Path, RigConfig]]:
+    """The same configurations.
+
+    Raises:
+        ConfigError: two are of one rig on one router.
+    """
     check_own("rig.id", ((path, f"{config.bus.router} {config.rig.id}") for path, config in loaded))
     return loaded
 
