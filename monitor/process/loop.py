@@ -292,8 +292,9 @@ class MonitorProcess:
         )
 
     def _tell_health(self, seen: Seen) -> None:
-        if self._alone:
+        if self._alone and self._cursor:
             self._alone.check()
+            self._cursor.keep()
         stale = seen.silent_s > max(1.0, self._stale_after)
         state = "unsuitable" if self._unsuitable else "stale" if stale else "running"
         text = self._unsuitable or ("no samples arrive" if stale else "")
