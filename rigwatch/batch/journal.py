@@ -82,15 +82,26 @@ class Journal:
         self._alone = Hold(beside)
         try:
             self._alone.take()
-            opened = beside.open("a+b")
-            if file.suffix == PARQUET and file.exists() and not opened.tell():
-                opened.writelines(lines_of(file))
-                opened.flush()
+            return self._filled(file, beside)
+        except HeldError as error:
+            raise BatchError(f"{file}: is in use by another run ({error})") from None
         except OSError as error:
             self._alone.give_up()
             raise BatchError(f"{file}: cannot be written: {reason_of(error)}") from None
-        except HeldError as error:
-            raise BatchError(f"{file}: is in use by another run ({error})") from None
+        except BaseException:
+            self._alone.give_up()
+            raise
+
+    def _filled(self, file: Path, beside: Path) -> BinaryIO:
+        """The journal, open, with what a finished file of Parquet holds."""
+        opened = beside.open("a+b")
+        try:
+            if file.suffix == PARQUET and file.exists() and not opened.tell():
+                opened.writelines(lines_of(file))
+                opened.flush()
+        except BaseException:
+            opened.close()
+            raise
         return opened
 
     def _read(self) -> None:
