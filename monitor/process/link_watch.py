@@ -113,14 +113,14 @@ def _drift(counters: Mapping[str, float]) -> tuple[float, float]:
 
 
 def disk_reports(
-    seen: Seen, recorder: Health | None, alive: bool, journal_failure: str = ""
+    seen: Seen, recorder: Health | None, absence: str, journal_failure: str = ""
 ) -> Iterator[tuple[str, Occasion, bool]]:
     """The same for the alarms of disk and recording.
 
     Args:
         seen: current observations.
         recorder: the recorder's last health message, None if it has never sent one.
-        alive: whether the recorder's process is running.
+        absence: why the recorder's process is not seen, "" if it is.
         journal_failure: why the alarm journal cannot be written, "" if it can.
     """
     free = recorder.counters.get("free_share", -1.0) if recorder else -1.0
@@ -129,9 +129,9 @@ def disk_reports(
     free_text = f"{free:.1%} of the disk is free"
     yield "disk", occasion(seen, text=text or free_text), short or bool(journal_failure)
     yield "disk_almost_full", occasion(seen, text=free_text), 0.0 <= free < ALMOST_FULL
-    gone = recorder is not None and not alive
+    gone = recorder is not None and bool(absence)
     stopped = recorder is not None and recorder.state == "not recording"
-    why = "the recorder process is not there" if gone else recorder.text if recorder else ""
+    why = absence if gone else recorder.text if recorder else ""
     yield "recording_stopped", occasion(seen, text=why), gone or stopped
 
 

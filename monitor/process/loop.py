@@ -133,7 +133,7 @@ class MonitorProcess:
 
     def waits(self) -> str:
         """Why there are no samples to come; empty if daq runs and has a device."""
-        return self._daq_trouble if self._daq_there() else "the daq process is not there"
+        return self._daq_trouble if self._daq_there() else self._absence("daq")
 
     def keep_position(self) -> None:
         """Store the position; all samples read so far have been processed.
@@ -168,8 +168,9 @@ class MonitorProcess:
         unjudged = self._delivered_s - self._estimated_s
         yield from device_reports(seen, self._daq, unjudged, self._unsuitable)
         failure = self._journal.failure if self._journal else ""
-        recorder_there = self._recorder_presence.holds(time.monotonic())
-        yield from disk_reports(seen, self._recorder, recorder_there, failure)
+        there = self._recorder_presence.holds(time.monotonic())
+        absence = "" if there else self._absence("recorder")
+        yield from disk_reports(seen, self._recorder, absence, failure)
         yield from self._keys.reports(seen)
 
     def _announce_router(self, seen: Seen) -> None:
@@ -258,6 +259,11 @@ class MonitorProcess:
 
         self.bus.watch_tokens(f"{ALIVE_KEY}/{process}", changed)
 
+    def _absence(self, process: str) -> str:
+        """Why a process is not seen: without a router nobody is."""
+        there = self.bus.connected()
+        return f"the {process} process is not there" if there else "the router does not answer"
+
     def _daq_there(self) -> bool:
         now = time.monotonic()
         if self.reader.heard:
@@ -284,7 +290,7 @@ class MonitorProcess:
         return Seen(
             *both_clocks(),
             silent,
-            self._daq_trouble if daq_there else "the daq process is not there",
+            self._daq_trouble if daq_there else self._absence("daq"),
             self.reader.heard,
             self.reader.contested or (self._daq is not None and self._daq.state == "two devices"),
             self._device,

@@ -190,6 +190,21 @@ def test_a_daq_that_is_gone_is_named(bench: Bench) -> None:
     assert "the daq process is not there" in standing["link"].cause
 
 
+def test_a_router_that_is_away_is_named_as_the_reason(bench: Bench) -> None:
+    bench.send(wave(0, 1, 7, 0))
+    bench.turn()
+    bench.network.up = False
+    bench.daq.close()
+
+    def named() -> bool:
+        bench.turn()
+        return "link" in {one.name for one in bench.monitor.rig.alarms.standing()}
+
+    assert wait_until(named, PATIENCE)
+    standing = {one.name: one for one in bench.monitor.rig.alarms.standing()}
+    assert standing["link"].cause.endswith("the router does not answer")
+
+
 def test_commands_are_obeyed_and_refusals_explained(bench: Bench) -> None:
     bench.send(wave(0, 1, 7, 0))
     bench.turn()
