@@ -80,6 +80,7 @@ class Acquisition:
             **counters,
             "lost_samples": self.tracker.lost,
             "duplicates": self.tracker.duplicates,
+            "foreign_samples": self.tracker.foreign,
             "drift_ppm": self.clock.drift_ppm,
             "certain_drift_ppm": self.clock.certain_drift_ppm,
             "clock_jumps": self.clock.jumps,

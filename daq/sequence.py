@@ -2,7 +2,8 @@
 
 32-bit counters are unwrapped, repeated samples dropped and counted, and gaps reported exactly. A
 restarted device is recognised by its boot number or, if it keeps that, by a counter that goes back
-although its clock does not.
+although its clock does not. A boot that has ended does not come back at once: where two take turns,
+two devices send on one line, and the one that came last is read alone.
 """
 
 import zlib
@@ -17,6 +18,9 @@ _REPEATS = 1024
 """A sample at most this far behind the newest may be a repeat; farther back is a new count."""
 _LONG_HOLE = 1024
 """From this many missing samples on, the device's clock must confirm the elapsed time."""
+
+_TURNS_NS = 2_000_000_000
+"""Time within which a boot that returns is that of a second device, not of a restart [ns]."""
 
 _REPEATS_IN_A_ROW = 64
 """More repeats than this in a row mean a new count."""
@@ -54,10 +58,12 @@ class SequenceTracker:
     Attributes:
         duplicates: samples dropped as repeats.
         lost: samples known to be lost.
+        foreign: samples of a second device, dropped.
     """
 
     def __init__(self, rate: float) -> None:
-        self.duplicates = 0
+        self.duplicates = self.foreign = 0
+        self._left: dict[int, int] = {}
         self.lost = 0
         self._period_us = 1e6 / rate
         self._device_boot: int | None = None
@@ -87,6 +93,9 @@ class SequenceTracker:
 
     def _place(self, boot: int, seq: int, us: int, arrived: int) -> list[Step]:
         """Add one sample; what is reported before it, or `_REPEATED`."""
+        if boot != self._device_boot and self._is_foreign(boot, arrived):
+            self.foreign += 1
+            return _REPEATED
         if boot != self._device_boot:
             reason = "the device has started anew" if self._device_boot is not None else ""
             return self._begin(boot, seq, us, arrived, reason)
@@ -105,6 +114,17 @@ class SequenceTracker:
         self._seq, self._us, self._arrived = self._seq + ahead, self._us + later_us, arrived
         self._repeats = 0
         return hole
+
+    def _is_foreign(self, boot: int, arrived: int) -> bool:
+        """Whether a boot returns that was left just now, while the one that followed goes on."""
+        since = arrived - _TURNS_NS
+        self._left = {one: at for one, at in self._left.items() if at > since}
+        if boot in self._left and self._arrived > since:
+            self._left[boot] = arrived
+            return True
+        if self._device_boot is not None:
+            self._left[self._device_boot] = self._arrived
+        return False
 
     def _is_repeated(self, ahead: int, later_us: int) -> bool:
         same_clock = abs(later_us - ahead * self._period_us) < self._period_us

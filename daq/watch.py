@@ -3,8 +3,9 @@
 `state` is the first of these that applies:
 
     reconnecting   the device is not open, or reopened and nothing has arrived yet
-    starting       open, nothing has arrived yet
     garbage        more than 1 % of the bytes of the last second belong to no frame
+    two devices    another device sends on the same line
+    starting       open, nothing has arrived yet
     stale          no sample for `stale_after`
     slow           fewer than 90 % of the nominal rate over the last hundred samples
     running
@@ -29,6 +30,7 @@ _PLAUSIBLE_AFTER_S, _PLAUSIBLE_LEAST = 0.75, 64
 _STATE_EVENTS: dict[str, tuple[Severity, str]] = {
     "reconnecting": ("error", "link_lost"),
     "garbage": ("error", "garbage"),
+    "two devices": ("error", "two_devices"),
     "stale": ("error", "stale"),
     "slow": ("warning", "slow"),
     "running": ("info", "running"),
@@ -73,7 +75,7 @@ class Watch:
         self._second_ns: int | None = None
         self._rates = {"rate_hz": 0.0, "rate_mean_hz": 0.0, "rate_worst_hz": 0.0}
         self._before: dict[str, float] = {}
-        self._garbage_text = ""
+        self._line_trouble: tuple[str, str] | None = None
         self._polls_failed = 0.0
         self._failure_told_ns = -_SECOND
         self._drift_severity: Severity = "info"
@@ -121,8 +123,8 @@ class Watch:
     def _judge(self, now_ns: int, link: Link) -> tuple[str, str]:
         if not link.connected or link.text:
             return "reconnecting", link.text
-        if self._garbage_text:
-            return "garbage", self._garbage_text
+        if self._line_trouble:
+            return self._line_trouble
         if self._last_ns is None:
             return "starting", "nothing has come from the device yet"
         silence = now_ns - self._last_ns
@@ -162,7 +164,7 @@ class Watch:
 
     def _second(self, now_ns: int, unix_ns: int, counters: Mapping[str, float]) -> list[Message]:
         self._update_rates(now_ns)
-        self._garbage_text = self._garbage(counters)
+        self._line_trouble = self._troubled(counters)
         self._second_ns, self._before = now_ns, dict(counters)
         return self._drift(unix_ns, counters)
 
@@ -180,6 +182,14 @@ class Watch:
             "rate_worst_hz": min(worst, now) if whole else self._rates["rate_worst_hz"],
         }
         self._second_samples = self._samples
+
+    def _troubled(self, counters: Mapping[str, float]) -> tuple[str, str] | None:
+        """State and text of what was wrong with the line in the last second."""
+        if garbage := self._garbage(counters):
+            return "garbage", garbage
+        foreign = counters.get("foreign_samples", 0.0) - self._before.get("foreign_samples", 0.0)
+        text = f"{foreign:.0f} samples of a second device on the same line are not used"
+        return ("two devices", text) if foreign > 0 else None
 
     def _garbage(self, counters: Mapping[str, float]) -> str:
         skipped, count, good = (

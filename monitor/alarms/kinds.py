@@ -91,8 +91,9 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "duplicate_source",
         "critical",
-        "a second process sends samples of this device; those of the first are used",
-        "Find and stop it; a second daq needs a rig id of its own.",
+        "a second process or device sends samples of this rig; those of one are used",
+        "Find and stop it; a second daq needs a rig id of its own, a second device a line of its "
+        "own.",
         _AT_ONCE,
     ),
     AlarmKind(
@@ -167,6 +168,15 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "nothing is being recorded",
         "Check the disk and the recorder's process. Monitoring continues; a recorder that returns "
         "fetches recent samples.",
+        _AT_ONCE,
+    ),
+    AlarmKind(
+        "certificates_end",
+        "error",
+        "certificates end within a month, or have ended: the next restart of router or machine "
+        "would leave the rig unwatched",
+        "Issue them anew with `rigwatch keys issue`. Processes on this machine take them up "
+        "without a restart; copy those of other machines there before `register.json`.",
         _AT_ONCE,
     ),
     AlarmKind(
@@ -383,6 +393,7 @@ REPORTED = frozenset(
     (
         "link", "stale", "duplicate_source", "loss", "line_noise", "slow_device", "clock_drift",
         "clock_wrong", "disk", "disk_almost_full", "recording_stopped", "estimates_missing",
+        "certificates_end",
     )
 )  # fmt: skip
 """Alarms whose conditions processes report without a sample."""

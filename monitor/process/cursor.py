@@ -30,12 +30,22 @@ class Cursor:
     def __init__(self, path: Path | str) -> None:
         self._path = Path(path)
         try:
-            Path(path).parent.mkdir(parents=True, exist_ok=True)
-            with Path(path).open("a+b") as file:
-                file.truncate(_SIZE)
-                self._bytes = _mapped(file.fileno())
+            self._bytes, self._file = _opened(self._path)
         except OSError as error:
             raise SessionError(f"{path}: cannot be opened: {reason_of(error)}") from error
+
+    def keep(self) -> None:
+        """Put the position into its file again if somebody has removed it, or the disk was full."""
+        try:
+            if self._file is not None and self._path.stat().st_ino == self._file:
+                return
+        except OSError:
+            pass
+        with contextlib.suppress(OSError):
+            fresh, self._file = _opened(self._path)
+            fresh[:] = self._bytes[:]
+            self._bytes.close()
+            self._bytes = fresh
 
     def read(self) -> tuple[int, int] | None:
         """The stored position; None if there is none."""
@@ -71,12 +81,19 @@ def stored_position(data: bytes) -> tuple[int, int] | None:
     return boot, seq
 
 
-def _mapped(file: int) -> mmap.mmap:
-    """The mapped file, or plain memory: writing to a mapping on a full disk kills the process."""
-    try:
-        os.posix_fallocate(file, 0, _SIZE)
-    except OSError as error:
-        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
-            raise
-        return mmap.mmap(-1, _SIZE)
-    return mmap.mmap(file, _SIZE)
+def _opened(path: Path) -> tuple[mmap.mmap, int | None]:
+    """The mapped file and its number.
+
+    Plain memory and None on a full disk, where writing to a mapping kills the process.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("a+b") as opened:
+        opened.truncate(_SIZE)
+        file = opened.fileno()
+        try:
+            os.posix_fallocate(file, 0, _SIZE)
+        except OSError as error:
+            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+                raise
+            return mmap.mmap(-1, _SIZE), None
+        return mmap.mmap(file, _SIZE), os.fstat(file).st_ino

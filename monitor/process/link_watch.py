@@ -69,12 +69,12 @@ class LinkWatch:
         """Name, occasion and state of every alarm of the link."""
         silent_ms, limit_ms = seen.silent_s * 1e3, self._stale_after * 1e3
         stale = seen.silent_s > self._stale_after
-        yield "stale", _occasion(seen, silent_ms, limit_ms), stale
+        yield "stale", occasion(seen, silent_ms, limit_ms), stale
         gone = bool(seen.daq_trouble) and (stale or seen.flowed)
-        yield "link", _occasion(seen, text=seen.daq_trouble), gone
-        yield "duplicate_source", _occasion(seen), seen.contested
+        yield "link", occasion(seen, text=seen.daq_trouble), gone
+        yield "duplicate_source", occasion(seen), seen.contested
         losing = seen.monotonic_ns - self._lost_at_ns < LOSS_SHOWN_NS
-        yield "loss", _occasion(seen, float(self._lost), 0.0, "samples lost so far"), losing
+        yield "loss", occasion(seen, float(self._lost), 0.0, "samples lost so far"), losing
 
     def clock_step(self, seen: Seen) -> int:
         """Step of the wall clock since the last call [ns]; 0 if it was not set."""
@@ -96,14 +96,14 @@ def device_reports(
         why: why there are no estimates, "" if unknown.
     """
     state, text = (daq.state, daq.text) if daq else ("", "")
-    yield "line_noise", _occasion(seen, text=text), state == "garbage"
-    yield "slow_device", _occasion(seen, text=text), state == "slow"
+    yield "line_noise", occasion(seen, text=text), state == "garbage"
+    yield "slow_device", occasion(seen, text=text), state == "slow"
     drift, certain = _drift(daq.counters if daq else {})
-    at = _occasion(seen, drift, DRIFT_PPM, f"off by {drift:.0f} ppm")
+    at = occasion(seen, drift, DRIFT_PPM, f"off by {drift:.0f} ppm")
     yield "clock_drift", at, certain > DRIFT_PPM
-    at = _occasion(seen, drift, WRONG_PPM, f"off by {drift:.0f} ppm")
+    at = occasion(seen, drift, WRONG_PPM, f"off by {drift:.0f} ppm")
     yield "clock_wrong", at, certain > WRONG_PPM
-    yield "estimates_missing", _occasion(seen, text=why), unjudged_s > UNJUDGED_S
+    yield "estimates_missing", occasion(seen, text=why), unjudged_s > UNJUDGED_S
 
 
 def _drift(counters: Mapping[str, float]) -> tuple[float, float]:
@@ -113,31 +113,32 @@ def _drift(counters: Mapping[str, float]) -> tuple[float, float]:
 
 
 def disk_reports(
-    seen: Seen, recorder: Health | None, alive: bool, journal_failure: str = ""
+    seen: Seen, recorder: Health | None, absence: str, journal_failure: str = ""
 ) -> Iterator[tuple[str, Occasion, bool]]:
     """The same for the alarms of disk and recording.
 
     Args:
         seen: current observations.
         recorder: the recorder's last health message, None if it has never sent one.
-        alive: whether the recorder's process is running.
+        absence: why the recorder's process is not seen, "" if it is.
         journal_failure: why the alarm journal cannot be written, "" if it can.
     """
     free = recorder.counters.get("free_share", -1.0) if recorder else -1.0
     short = bool(recorder and recorder.counters.get("disk_trouble", 0.0) > 0.0)
     text = (recorder.text if recorder and short else "") or journal_failure
     free_text = f"{free:.1%} of the disk is free"
-    yield "disk", _occasion(seen, text=text or free_text), short or bool(journal_failure)
-    yield "disk_almost_full", _occasion(seen, text=free_text), 0.0 <= free < ALMOST_FULL
-    gone = recorder is not None and not alive
+    yield "disk", occasion(seen, text=text or free_text), short or bool(journal_failure)
+    yield "disk_almost_full", occasion(seen, text=free_text), 0.0 <= free < ALMOST_FULL
+    gone = recorder is not None and bool(absence)
     stopped = recorder is not None and recorder.state == "not recording"
-    why = "the recorder process is not there" if gone else recorder.text if recorder else ""
-    yield "recording_stopped", _occasion(seen, text=why), gone or stopped
+    why = absence if gone else recorder.text if recorder else ""
+    yield "recording_stopped", occasion(seen, text=why), gone or stopped
 
 
-def _occasion(
+def occasion(
     seen: Seen, value: float = float("nan"), high: float = float("nan"), text: str = ""
 ) -> Occasion:
+    """The occasion of an alarm that no sample raises."""
     boot, seq = seen.position
     return Occasion(
         seen.device, boot, seq, seen.t_ns, value, float("nan"), high, onset_seq=seq, text=text

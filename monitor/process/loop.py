@@ -17,20 +17,21 @@ from monitor.model import RigModel, load_model
 from monitor.pipeline import RigMonitor, compile_kernels
 from monitor.process.cursor import Cursor
 from monitor.process.health import HealthBook
+from monitor.process.key_watch import KeyWatch
 from monitor.process.link_watch import LinkWatch, Seen, device_reports, disk_reports
 from monitor.process.model_requests import ModelDesk, Place
 from monitor.process.operator_desk import OperatorDesk
 from monitor.process.presence import Presence
 from monitor.process.startup_grace import Patience
 from monitor.signals import MONITOR_RESET
-from rigwatch.wire.bus import Bus, Close, CommandCheck, joined, serve_alarm_list
+from rigwatch.wire.bus import Bus, CommandCheck, joined, serve_alarm_list
 from rigwatch.wire.delivery import POSITION_WRONG, SampleReader
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.host import (
     MONITOR,
     Heartbeat,
+    Kept,
     both_clocks,
-    hold,
     prepare_for_real_time,
     raise_priority,
     set_at_signal,
@@ -78,10 +79,11 @@ class MonitorProcess:
         friction = FRICTION in section.detectors
         self.rig = RigMonitor(model, section.alarms, detectors, str(path), friction)
         self.bus = bus
-        self._give_up, self._journal, self._cursor = _opened(section.journal)
+        self._alone, self._journal, self._cursor = _opened(section.journal)
         self._done = self._cursor.read() if self._cursor else None
         self._stale_after = config.stale_after
         self._links = LinkWatch(self._stale_after)
+        self._keys = KeyWatch(config.bus.security.keys)
         self._health = HealthBook("monitor")
         self._device = config.daq.name
         self._patience = Patience(time.monotonic())
@@ -131,7 +133,7 @@ class MonitorProcess:
 
     def waits(self) -> str:
         """Why there are no samples to come; empty if daq runs and has a device."""
-        return self._daq_trouble if self._daq_there() else "the daq process is not there"
+        return self._daq_trouble if self._daq_there() else self._absence("daq")
 
     def keep_position(self) -> None:
         """Store the position; all samples read so far have been processed.
@@ -166,8 +168,10 @@ class MonitorProcess:
         unjudged = self._delivered_s - self._estimated_s
         yield from device_reports(seen, self._daq, unjudged, self._unsuitable)
         failure = self._journal.failure if self._journal else ""
-        recorder_there = self._recorder_presence.holds(time.monotonic())
-        yield from disk_reports(seen, self._recorder, recorder_there, failure)
+        there = self._recorder_presence.holds(time.monotonic())
+        absence = "" if there else self._absence("recorder")
+        yield from disk_reports(seen, self._recorder, absence, failure)
+        yield from self._keys.reports(seen)
 
     def _announce_router(self, seen: Seen) -> None:
         """Report to subscribers that the router was unavailable."""
@@ -208,7 +212,8 @@ class MonitorProcess:
         for kept in (self._journal, self._cursor):
             if kept:
                 kept.close()
-        self._give_up()
+        if self._alone:
+            self._alone.give_up()
 
     def _change_models(self) -> None:
         """Apply model changes; all samples read so far have been processed."""
@@ -254,6 +259,11 @@ class MonitorProcess:
 
         self.bus.watch_tokens(f"{ALIVE_KEY}/{process}", changed)
 
+    def _absence(self, process: str) -> str:
+        """Why a process is not seen: without a router nobody is."""
+        there = self.bus.connected()
+        return f"the {process} process is not there" if there else "the router does not answer"
+
     def _daq_there(self) -> bool:
         now = time.monotonic()
         if self.reader.heard:
@@ -280,14 +290,17 @@ class MonitorProcess:
         return Seen(
             *both_clocks(),
             silent,
-            self._daq_trouble if daq_there else "the daq process is not there",
+            self._daq_trouble if daq_there else self._absence("daq"),
             self.reader.heard,
-            self.reader.contested,
+            self.reader.contested or (self._daq is not None and self._daq.state == "two devices"),
             self._device,
             self.reader.position or (0, -1),
         )
 
     def _tell_health(self, seen: Seen) -> None:
+        if self._alone and self._cursor:
+            self._alone.check()
+            self._cursor.keep()
         stale = seen.silent_s > max(1.0, self._stale_after)
         state = "unsuitable" if self._unsuitable else "stale" if stale else "running"
         text = self._unsuitable or ("no samples arrive" if stale else "")
@@ -305,18 +318,18 @@ class MonitorProcess:
         )
 
 
-def _opened(journal: str) -> tuple[Close, AlarmJournal | None, Cursor | None]:
+def _opened(journal: str) -> tuple[Kept | None, AlarmJournal | None, Cursor | None]:
     """Lock, journal and position at a path, all or none: a rig that cannot start keeps no file."""
     if not journal:
-        return lambda: None, None, None
+        return None, None, None
     with ExitStack() as opened:
-        give_up = hold(Path(f"{journal}.lock"), f"{journal}: alarm journal")
-        opened.callback(give_up)
+        alone = Kept(Path(f"{journal}.lock"), f"{journal}: alarm journal")
+        opened.callback(alone.give_up)
         kept = AlarmJournal(journal)
         opened.callback(kept.close)
         cursor = Cursor(f"{journal}.position")
         opened.pop_all()
-        return give_up, kept, cursor
+        return alone, kept, cursor
 
 
 def monitor_section(config: RigConfig, path: Path | str) -> MonitorSection:

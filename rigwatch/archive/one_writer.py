@@ -1,13 +1,13 @@
 """One writer of an index at a time: two would forget what the other has catalogued."""
 
-import fcntl
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from rigwatch.archive.layout import INDEX
 from rigwatch.archive.store import Store
-from rigwatch.wire.errors import ArchiveError, reason_of
+from rigwatch.wire.errors import ArchiveError, HeldError, reason_of
+from rigwatch.wire.host import Hold
 
 LOCK = f"{INDEX}/lock"
 
@@ -25,22 +25,22 @@ def one_writer(store: Store) -> Iterator[None]:
         yield
         return
     path = Path(store.path(LOCK))
+    lock = Hold(path)
     try:
-        path.parent.mkdir(exist_ok=True)
-        file = path.open("w")
+        lock.take()
     except OSError as error:
         raise ArchiveError(f"{path}: cannot be written: {reason_of(error)}") from None
-    with file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise other_writer(store) from None
+    except HeldError as error:
+        raise other_writer(store, str(error)) from None
+    try:
         yield
+    finally:
+        lock.give_up()
 
 
-def other_writer(store: Store) -> ArchiveError:
+def other_writer(store: Store, who: str = "another process") -> ArchiveError:
     """The error of a writer that is not alone."""
     return ArchiveError(
-        f"{store.url}: another process writes its index, expected one at a time:"
+        f"{store.url}: {who} writes its index, expected one at a time:"
         " run this again when the other has ended"
     )

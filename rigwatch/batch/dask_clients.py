@@ -4,9 +4,11 @@ The file is for dask-jobqueue, which submits workers to a batch system as jobs.
 """
 
 import logging
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from typing import Annotated, Any, Literal
 from urllib.parse import urlsplit
 
@@ -18,6 +20,8 @@ from rigwatch.wire.typed_files import Section, load
 
 CONNECT_S = 15.0
 """Longest wait for a scheduler [s]."""
+ANSWER_S = 5.0
+"""Longest wait for its first words after that [s]."""
 FIRST_WORKER_S = 60.0
 """Longest wait for its first worker [s]."""
 KINDS = {
@@ -135,12 +139,23 @@ def _connected(client: Any, where: str) -> Any:
         host = port = None
     if not host:
         raise BatchError(f"--on: found {where!r}, expected dask://host:8786")
+    address, made = f"tcp://{host}:{port or 8786}", SimpleQueue[Any]()
+
+    def connect() -> None:
+        try:
+            made.put(client(address, timeout=CONNECT_S, set_as_default=False))
+        except Exception as error:  # whatever the bytes of something else make of Dask
+            made.put(error)
+
+    # Dask's timeout is for the connection: what answers and is no scheduler it awaits for ever.
+    threading.Thread(target=connect, name="dask", daemon=True).start()
     try:
-        return client(f"tcp://{host}:{port or 8786}", timeout=CONNECT_S, set_as_default=False)
-    except (OSError, ValueError, RuntimeError) as error:
-        raise BatchError(
-            f"{where}: no scheduler of this version answers: {one_line(error)}"
-        ) from None
+        found = made.get(timeout=CONNECT_S + ANSWER_S)
+    except Empty:
+        raise BatchError(f"{where}: what answers there is no scheduler of Dask") from None
+    if isinstance(found, Exception):
+        raise BatchError(f"{where}: no scheduler of this version answers: {one_line(found)}")
+    return found
 
 
 def _check_workers(client: Any, where: str, wait: float) -> None:

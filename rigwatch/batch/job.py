@@ -6,6 +6,7 @@ and the version of rigwatch. Settings that are files count with their content.
 
 import hashlib
 import inspect
+import stat
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,12 +28,14 @@ def content_hash(path: Path) -> str:
     """SHA-256 of a file, or of the names and contents of all files of a folder.
 
     Raises:
-        OSError: a file cannot be read.
+        OSError: a file cannot be read, or is none: to open a pipe would wait for ever.
     """
     if path.is_dir():
         files = sorted(file for file in path.rglob("*") if file.is_file())
         listed = [(str(file.relative_to(path)), content_hash(file)) for file in files]
         return hashlib.sha256(msgspec.json.encode(listed)).hexdigest()
+    if not stat.S_ISREG(path.stat().st_mode):
+        raise OSError(f"{path}: is no file")
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

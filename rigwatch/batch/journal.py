@@ -4,7 +4,6 @@ A line is appended whole, so a client that is killed leaves at most one torn lin
 For Parquet the lines are kept beside the file until all results are there.
 """
 
-import fcntl
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -14,7 +13,8 @@ import msgspec
 
 from rigwatch.batch.job import Outcome
 from rigwatch.batch.parquet import lines_of, write_parquet
-from rigwatch.wire.errors import BatchError, reason_of
+from rigwatch.wire.errors import BatchError, HeldError, reason_of
+from rigwatch.wire.host import Hold
 from rigwatch.wire.new_file import sync
 from rigwatch.wire.typed_files import JsonError, decoded
 
@@ -77,18 +77,31 @@ class Journal:
             raise
 
     def _opened(self, file: Path) -> BinaryIO:
+        """The journal, locked: nothing else opens it, as closing it would free the lock."""
         beside = journal_of(file)
+        self._alone = Hold(beside)
         try:
-            if file.suffix == PARQUET and file.exists() and not beside.exists():
-                beside.write_bytes(b"".join(lines_of(file)))
-            opened = beside.open("a+b")
+            self._alone.take()
+            return self._filled(file, beside)
+        except HeldError as error:
+            raise BatchError(f"{file}: is in use by another run ({error})") from None
         except OSError as error:
+            self._alone.give_up()
             raise BatchError(f"{file}: cannot be written: {reason_of(error)}") from None
+        except BaseException:
+            self._alone.give_up()
+            raise
+
+    def _filled(self, file: Path, beside: Path) -> BinaryIO:
+        """The journal, open, with what a finished file of Parquet holds."""
+        opened = beside.open("a+b")
         try:
-            fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+            if file.suffix == PARQUET and file.exists() and not opened.tell():
+                opened.writelines(lines_of(file))
+                opened.flush()
+        except BaseException:
             opened.close()
-            raise BatchError(f"{file}: is in use by another run") from None
+            raise
         return opened
 
     def _read(self) -> None:
@@ -171,6 +184,7 @@ class Journal:
         """Close the file."""
         if self._file is not None:
             self._file.close()
+            self._alone.give_up()
 
 
 def journal_of(file: Path) -> Path:

@@ -1,13 +1,12 @@
 """The folder of one demonstration: a second one would take its alarms, model and configuration."""
 
-import fcntl
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import chain, count
 from pathlib import Path
-from typing import IO
 
-from rigwatch.wire.errors import RigwatchError, reason_of
+from rigwatch.wire.errors import HeldError, RigwatchError, reason_of
+from rigwatch.wire.host import Hold
 
 USUAL = Path("demo-session")
 LOCK = "lock"
@@ -24,25 +23,25 @@ def own_folder(wanted: Path | None) -> Iterator[Path]:
         RigwatchError: the wanted folder is in use, or cannot be written.
     """
     further = (USUAL.with_name(f"{USUAL.name}-{number}") for number in count(2))
-    folders = [wanted] if wanted else chain([USUAL], further)
-    found = ((folder, lock) for folder in folders if (lock := _held(folder)) is not None)
-    folder, lock = next(found, (None, None))
-    if folder is None or lock is None:
-        raise RigwatchError(f"{wanted}: another demonstration runs there, expected a free folder")
-    with lock:
-        yield folder
+    for folder in [wanted] if wanted else chain([USUAL], further):
+        try:
+            lock = _held(folder)
+        except HeldError as error:
+            if wanted:
+                text = f"another demonstration runs there ({error}), expected a free folder"
+                raise RigwatchError(f"{wanted}: {text}") from None
+            continue
+        try:
+            yield folder
+        finally:
+            lock.give_up()
+        return
 
 
-def _held(folder: Path) -> IO[str] | None:
-    """The folder's lock, which the kernel frees with this process; None if another holds it."""
+def _held(folder: Path) -> Hold:
+    lock = Hold(folder / LOCK)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = (folder / LOCK).open("w", encoding="utf-8")
+        lock.take()
     except OSError as error:
         raise RigwatchError(f"{folder}: cannot be written: {reason_of(error)}") from None
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        lock.close()
-        return None
     return lock

@@ -76,7 +76,7 @@ def check_keys(config: RigConfig) -> Iterator[Finding]:
     ended = any(days_left(one, today) < 0 for one in soon)
     dates = ", ".join(f"{one.name} ends {one.ends}" for one in soon)
     text = dates or f"{folder}: {len(known)} certificates in force"
-    remedy = "issue them anew with rigwatch keys issue, and restart the processes"
+    remedy = "issue them anew with rigwatch keys issue"
     yield judged("keys", not soon, text, remedy, "fail" if ended else "warn")
     private = (key_files(folder, one.name)[1] for one in known)
     open_ones = [one.name for one in private if one.is_file() and one.stat().st_mode & 0o077]

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from rigwatch.fleet.rig_state import RigState, judged, unreachable
 from rigwatch.wire.bus import Bus, Subscription, ask_alarm_list, connect, unique_process
-from rigwatch.wire.errors import BusError
+from rigwatch.wire.errors import BusError, ConfigError
 from rigwatch.wire.messages import ALIVE_KEY, HEALTH, Health
-from rigwatch.wire.rig_config import RigConfig
-from rigwatch.wire.several_rigs import load_rigs
+from rigwatch.wire.rig_config import RigConfig, load_rig
+from rigwatch.wire.several_rigs import apart, valid_rigs
 
 MOST_AT_ONCE = 64
 """Rigs that are asked at the same time."""
@@ -99,24 +99,40 @@ class Onlooker:
 
 
 class Fleet:
-    """The rigs of several configurations.
+    """The rigs of several configurations; one that is wrong is a rig of which nothing is known.
 
     Args:
         paths: the configurations.
         timeout: longest wait for a rig [s].
 
     Raises:
-        ConfigError: a configuration is invalid, or two are of one rig on one router.
+        ConfigError: all configurations are invalid, or two are of one rig on one router.
     """
 
     def __init__(self, paths: Sequence[Path], timeout: float) -> None:
-        self._rigs = [Onlooker(path, config, timeout) for path, config in load_rigs(paths)]
+        self._timeout = timeout
+        self._loaded = valid_rigs(paths)
+        self._rigs = [Onlooker(path, config, timeout) for path, config in self._loaded]
+        right = {path for path, _ in self._loaded}
+        self._wrong = [path for path in paths if path not in right]
         self._threads = ThreadPoolExecutor(min(MOST_AT_ONCE, max(1, len(paths))))
 
     def states(self) -> list[RigState]:
         """The present state of each rig, the worst first; those alike by name."""
-        states = list(self._threads.map(Onlooker.state, self._rigs))
+        unknown = [state for path in tuple(self._wrong) if (state := self._load(path))]
+        states = [*unknown, *self._threads.map(Onlooker.state, self._rigs)]
         return sorted(states, key=lambda state: (-state.rank, state.rig))
+
+    def _load(self, path: Path) -> RigState | None:
+        """The state of a rig whose configuration is wrong; None if it has been mended."""
+        try:
+            loaded = apart([*self._loaded, (path, load_rig(path))])
+        except ConfigError as error:
+            return unreachable(path.name, str(path), str(error))
+        self._loaded = loaded
+        self._wrong.remove(path)
+        self._rigs.append(Onlooker(*loaded[-1], self._timeout))
+        return None
 
     def close(self) -> None:
         """Leave all buses."""

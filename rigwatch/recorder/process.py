@@ -20,7 +20,7 @@ from rigwatch.recorder.resuming import of_living
 from rigwatch.recorder.retention import Retention
 from rigwatch.recorder.store import Store
 from rigwatch.wire.bus import Bus, joined
-from rigwatch.wire.host import Heartbeat, Pulse, free_share, hold, use_few_pools
+from rigwatch.wire.host import Heartbeat, Kept, Pulse, free_share, use_few_pools
 from rigwatch.wire.messages import (
     ALARMS,
     ESTIMATES,
@@ -146,21 +146,20 @@ def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event, pul
         SessionError: another process records this rig into the same folder.
     """
     root = Path((config.recorder or RecorderSection()).folder)
-    give_up = hold(root / f".{config.rig.id}.lock", f"{root}: recording of {config.rig.id}")
+    kept = Kept(root / f".{config.rig.id}.lock", f"{root}: recording of {config.rig.id}")
     try:
-        return _record(config, run, bus, stop, pulse)
+        recorder = Recorder(config, run, bus)
+        pulse.ready(f"recording to {recorder.store.folder}")
+        try:
+            while not stop.wait(recorder.settings.flush * _OF_FLUSH):
+                kept.check()
+                recorder.turn(time.monotonic(), time.time_ns())
+                pulse.advance(recorder.feed.samples, "no samples arrive")
+            pulse.stopping()
+        finally:
+            recorder.close(time.monotonic(), time.time_ns())
     finally:
-        give_up()
-
-
-def _record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event, pulse: Pulse) -> Path:
-    recorder = Recorder(config, run, bus)
-    pulse.ready(f"recording to {recorder.store.folder}")
-    while not stop.wait(recorder.settings.flush * _OF_FLUSH):
-        recorder.turn(time.monotonic(), time.time_ns())
-        pulse.advance(recorder.feed.samples, "no samples arrive")
-    pulse.stopping()
-    recorder.close(time.monotonic(), time.time_ns())
+        kept.give_up()
     return recorder.store.folder
 
 

@@ -5,6 +5,7 @@ CERTIFICATES END    once a day, from a month before one of them ends
 """
 
 import contextlib
+import logging
 import math
 import threading
 import time
@@ -14,10 +15,12 @@ from pathlib import Path
 
 from rigwatch.router.refusal_log import RefusalLog
 from rigwatch.wire.access import days_left, ending_soon, endings_text, in_force, read_register
-from rigwatch.wire.bus import Bus, connect
+from rigwatch.wire.bus import Bus, joined
 from rigwatch.wire.errors import KeysError, RigwatchError
 from rigwatch.wire.messages import EVENTS, HEALTH, Event, Health
 from rigwatch.wire.rig_config import RigConfig
+
+_log = logging.getLogger(__name__)
 
 PROCESS = "router"
 BETWEEN_HEALTH = 1.0
@@ -51,13 +54,11 @@ class RouterReport:
 
     def _run(self) -> None:
         try:
-            bus = connect(self._config, PROCESS)
+            with joined(self._config, PROCESS, self._stop) as bus:
+                while bus is not None and not self._stop.wait(BETWEEN_HEALTH):
+                    self.turn(bus, time.monotonic(), time.time_ns())
         except RigwatchError as error:
-            self.trouble = str(error)
-            return
-        while not self._stop.wait(BETWEEN_HEALTH):
-            self.turn(bus, time.monotonic(), time.time_ns())
-        bus.close()
+            _log.warning("the router reports nothing: %s", error)
 
     def turn(self, bus: Bus, now: float, t_ns: int) -> None:
         """Report once; `now` is monotonic time [s], `t_ns` Unix time [ns]."""

@@ -10,6 +10,7 @@ RigwatchError             one plain line, shown by the command line without a tr
 ├── KeysError             keys or certificates are missing
 ├── BusError              the bus cannot be reached
 │   └── NoRouterError     no router has answered yet
+├── HeldError             another process keeps it; callers say what it is
 ├── SessionError          a session file cannot be read or written
 ├── ImportDataError       foreign data cannot be imported as a session (column, unit, rate)
 ├── ModelError            a model cannot be fitted or does not match the data
@@ -99,6 +100,10 @@ class BusError(RigwatchError):
 
 class NoRouterError(BusError):
     """No router has answered yet; one may later."""
+
+
+class HeldError(RigwatchError):
+    """Another process keeps what only one may keep; the text names that process."""
 
 
 class SessionError(RigwatchError):

@@ -10,19 +10,14 @@ Rigs = Sequence[tuple[Path, RigConfig]]
 """Configurations of rigs, each with its path."""
 
 
-def load_rigs(paths: Sequence[Path]) -> list[tuple[Path, RigConfig]]:
-    """The configurations at `paths`, each with its path.
-
-    Raises:
-        ConfigError: one is invalid, or two are of one rig on one router.
-    """
-    return _apart([(path, load_rig(path)) for path in paths])
-
-
 def valid_rigs(
     paths: Sequence[Path], say: Callable[[str], object] | None = None
 ) -> list[tuple[Path, RigConfig]]:
-    """The same without files that are wrong, of which `say`, if given, is told.
+    """The configurations at `paths`, each with its path, without files that are wrong.
+
+    Args:
+        paths: the files.
+        say: told of each that is wrong.
 
     Raises:
         ConfigError: all are invalid, or two are of one rig on one router.
@@ -38,10 +33,15 @@ def valid_rigs(
     if say is not None:
         for mistake in mistakes:
             say(str(mistake))
-    return _apart(loaded)
+    return apart(loaded)
 
 
-def _apart(loaded: list[tuple[Path, RigConfig]]) -> list[tuple[Path, RigConfig]]:
+def apart(loaded: list[tuple[Path, RigConfig]]) -> list[tuple[Path, RigConfig]]:
+    """The same configurations.
+
+    Raises:
+        ConfigError: two are of one rig on one router.
+    """
     check_own("rig.id", ((path, f"{config.bus.router} {config.rig.id}") for path, config in loaded))
     return loaded
 

@@ -3,6 +3,7 @@
 Notices ──▶ queue of the recipient ──▶ thread: command or Apprise, repeated on failure
 """
 
+import contextlib
 import json
 import logging
 import os
@@ -26,6 +27,10 @@ RETRIES_S = (2.0, 10.0, 60.0)
 """Pauses before further attempts of a notice that failed [s]."""
 COMMAND_S = 60.0
 """Longest run of a command [s]."""
+ADDRESS_S = 30.0
+"""Longest attempt to reach an address: a server may answer a byte at a time for ever [s]."""
+MOST_HUNG = 4
+"""Attempts at an address that may hang at the same time; further ones fail at once."""
 Send = Callable[[Notice], bool]
 
 
@@ -181,7 +186,31 @@ def _apprise_sender(recipient: RecipientSection, rig: str, file: Path) -> Send:
         kind = kinds.get(notice.alarm.severity, apprise.NotifyType.FAILURE)
         return bool(service.notify(body, title, kind))
 
-    return send
+    return _bounded(send)
+
+
+def _bounded(send: Send) -> Send:
+    """The same, ended after a while; a thread that hangs cannot be ended, only left behind."""
+    hung: list[threading.Thread] = []
+
+    def within(notice: Notice) -> bool:
+        hung[:] = [thread for thread in hung if thread.is_alive()]
+        if len(hung) >= MOST_HUNG:
+            return False
+        reached: list[bool] = []
+
+        def attempt() -> None:
+            with contextlib.suppress(Exception):  # as the plugins of Apprise raise
+                reached.append(send(notice))
+
+        thread = threading.Thread(target=attempt, name="notify", daemon=True)
+        thread.start()
+        thread.join(ADDRESS_S)
+        if thread.is_alive():
+            hung.append(thread)
+        return bool(reached and reached[0])
+
+    return within
 
 
 def text_of(notice: Notice, rig: str) -> tuple[str, str]:

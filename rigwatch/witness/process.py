@@ -8,6 +8,7 @@ import time
 
 import msgspec
 
+from rigwatch.wire.access import keys_trouble
 from rigwatch.wire.bus import (
     MOST_COMMANDS,
     Bus,
@@ -31,6 +32,7 @@ from rigwatch.wire.messages import (
 )
 from rigwatch.wire.rig_config import RigConfig, SecuritySection, WitnessSection
 from rigwatch.witness.announcer import Announcer
+from rigwatch.witness.kept_alarm import KeptAlarm, beside_journal
 from rigwatch.witness.outputs import Outputs
 from rigwatch.witness.stale_alarm import StaleAlarm
 
@@ -50,6 +52,7 @@ class Witness:
         bus: on which the monitor publishes.
         now: monotonic time [s].
         security: section [bus.security].
+        kept: keeps the witness's own alarm over restarts.
 
     Raises:
         ConfigError: a heartbeat output or the file of people is invalid.
@@ -62,8 +65,9 @@ class Witness:
         bus: Bus,
         now: float,
         security: SecuritySection | None = None,
+        kept: KeptAlarm | None = None,
     ) -> None:
-        security = security or SecuritySection()
+        self._security = security = security or SecuritySection()
         self.settings, self._bus = settings, bus
         bus.announce()
         self._announcer = Announcer(settings, bus.rig)
@@ -72,7 +76,9 @@ class Witness:
         self._alarms = bus.listen(ALARMS)
         self._stale_after = settings.stale_after or LEAST_SILENCE
         self._heard_at = now + max(0.0, FOR_MONITOR - self._stale_after)
-        self._stale = StaleAlarm(CommandCheck(bus, security))
+        self._stale = StaleAlarm(CommandCheck(bus, security), kept)
+        # An alarm of an earlier run ends with an estimate, not with the patience for the first.
+        self._unheard = self._stale.holds
         self._commands = bus.subscribe(COMMANDS)
         self._told_at = now - 1.0
         for alarm in _standing(bus):
@@ -82,9 +88,10 @@ class Witness:
     def turn(self, now: float, t_ns: int) -> None:
         """Check once; `now` is monotonic time [s], `t_ns` Unix time [ns]."""
         if self._estimates.drain():
-            self._heard_at = now
+            self._heard_at, self._unheard = now, False
         silent = now - self._heard_at
-        for alarm in self._stale.judge(silent > self._stale_after, silent, t_ns):
+        stale = self._unheard or silent > self._stale_after
+        for alarm in self._stale.judge(stale, silent, t_ns, self._link_trouble):
             self._bus.publish(ALARMS, alarm)
         self._obey(t_ns)
         for alarm in self._alarms.drain():
@@ -93,6 +100,13 @@ class Witness:
         if now - self._told_at >= 1.0:
             self._told_at = now
             self._report(now, t_ns)
+
+    def _link_trouble(self) -> str:
+        """Why nothing is heard: no router, perhaps since certificates have ended."""
+        if self._bus.connected():
+            return ""
+        ended = keys_trouble(self._security, PROCESS)
+        return "the router does not answer" + (f": {ended}" if ended else "")
 
     def _hear(self, alarm: Alarm, now: float) -> None:
         self._announcer.hear(alarm, now)
@@ -150,7 +164,9 @@ def run(config: RigConfig, stop: threading.Event) -> None:
     with joined(config, PROCESS, stop) as bus:
         if bus is None:
             return
-        witness = Witness(patient(config), bus, time.monotonic(), config.bus.security)
+        witness = Witness(
+            patient(config), bus, time.monotonic(), config.bus.security, beside_journal(config)
+        )
         heartbeat = Heartbeat(PROCESS)
         heartbeat.ready()
         turns = 0

@@ -1,6 +1,6 @@
 """The witness's own alarm: the monitor sends no estimates."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from rigwatch.wire.bus import CommandCheck
 from rigwatch.wire.messages import (
@@ -13,6 +13,7 @@ from rigwatch.wire.messages import (
     Event,
     Identity,
 )
+from rigwatch.witness.kept_alarm import KeptAlarm
 
 _NONE = float("nan")
 
@@ -22,25 +23,31 @@ class StaleAlarm:
 
     Args:
         check: verifies the commands of operators.
+        kept: keeps the alarm over restarts.
 
     Attributes:
         standing: the alarm until estimates come again and somebody has acknowledged it, or None.
     """
 
-    def __init__(self, check: CommandCheck) -> None:
-        self.standing: Alarm | None = None
+    def __init__(self, check: CommandCheck, kept: KeptAlarm | None = None) -> None:
+        self._kept = kept or KeptAlarm()
+        self.standing = self._kept.read()
         self._check = check
 
-    def judge(self, stale: bool, silent: float, t_ns: int) -> Iterator[Alarm]:
+    def judge(
+        self, stale: bool, silent: float, t_ns: int, why: Callable[[], str] = str
+    ) -> Iterator[Alarm]:
         """The transition, if there is one.
 
         Args:
             stale: whether estimates are missing.
             silent: time since the last one [s].
             t_ns: Unix time [ns].
+            why: asked for the reason when the alarm is raised; "" if none is known.
         """
         if stale and not self.holds:
-            yield self._become(_alarm("unacknowledged", f"for {silent:.1f} s", t_ns))
+            text = f"for {silent:.1f} s{f'; {reason}' if (reason := why()) else ''}"
+            yield self._become(_alarm("unacknowledged", text, t_ns))
         elif not stale and self.standing is not None and self.holds:
             seen = self.standing.state == "acknowledged"
             state: AlarmState = "normal" if seen else "cleared_unacknowledged"
@@ -53,6 +60,7 @@ class StaleAlarm:
 
     def _become(self, alarm: Alarm) -> Alarm:
         self.standing = None if alarm.state == "normal" else alarm
+        self._kept.write(self.standing)
         return alarm
 
     def command(self, command: AlarmCommand, t_ns: int) -> Iterator[Alarm | Event]:

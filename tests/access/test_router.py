@@ -1,5 +1,6 @@
 """The router of a rig with keys follows the register, and counts what it refuses."""
 
+import shutil
 import threading
 import time
 from collections.abc import Iterator
@@ -10,9 +11,9 @@ import pytest
 from rigwatch.keys import Authority
 from rigwatch.router import RefusalLog
 from rigwatch.router.report import RouterReport
-from rigwatch.wire.bus import DENIED_MARK, REFUSED_MARK, Bus, connect
+from rigwatch.wire.bus import DENIED_MARK, REFUSED_MARK, Bus, connect, open_router
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
-from rigwatch.wire.errors import BusError
+from rigwatch.wire.errors import BusError, KeysError
 from rigwatch.wire.messages import ALARMS, COMMANDS, EVENTS, HEALTH, AlarmCommand, encode
 from rigwatch.wire.rig_config import load_rig
 from tests.access.secured_rig import SecuredRig, make_keys
@@ -43,7 +44,7 @@ def heard_from(senders: dict[str, Bus], receiver: Bus) -> set[str]:
     return users
 
 
-def test_a_revocation_and_a_new_certificate_are_in_force_without_a_restart(
+def test_a_revocation_a_new_and_a_renewed_certificate_are_in_force_without_a_restart(
     rig: SecuredRig,
 ) -> None:
     senders = {name: rig.bus(f"ack-{name}", rig.of(name)) for name in ("ann", "bob")}
@@ -60,12 +61,15 @@ def test_a_revocation_and_a_new_certificate_are_in_force_without_a_restart(
     Authority(rig.keys).issue("carl", "operator")
     senders["carl"] = rig.bus("ack-carl", rig.of("carl"))
     eventually(lambda: heard_from(senders, monitor) == {"bob", "carl"}, "carl is heard")
+    Authority(rig.keys).issue("bob", "operator")
+    eventually(lambda: reloads() >= 3.0, "the register is read once more")
+    assert heard_from(senders, monitor) == {"bob", "carl"}
     (rig.keys / "register.json").write_text("{")
     assert "bob" in heard_from(senders, monitor)
 
 
 def test_refused_connections_and_denied_messages_are_counted_and_reported(
-    rig: SecuredRig, tmp_path: Path
+    rig: SecuredRig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     observer = rig.bus("recorder")
     healths, events = observer.subscribe(HEALTH), observer.subscribe(EVENTS)
@@ -93,6 +97,10 @@ def test_refused_connections_and_denied_messages_are_counted_and_reported(
     (tmp_path / "other.toml").write_text(rig.path.read_text().replace(str(rig.keys), str(other)))
     with pytest.raises(BusError, match="no router answers"):
         connect(load_rig(tmp_path / "other.toml"), "monitor", 0.5)
+    monkeypatch.setattr("rigwatch.keys.authority.CERTIFICATE_DAYS", -1 / 86_400)
+    Authority(rig.keys).issue("ann", "operator")
+    with pytest.raises(BusError, match=r"ann\.pem has ended on .*`rigwatch keys issue`"):
+        connect(rig.config, "ack", 0.5)
     eventually(lambda: counted("refused_connections") > refused, "the refusal is counted")
     eventually(lambda: any(e.code == "ACCESS REFUSED" for e in events.drain()), "an event")
 
@@ -123,3 +131,38 @@ def test_the_log_of_refusals_passes_everything_else_on() -> None:
     assert (log.connections, log.messages) == (1, 1)
     passed = log.take(b"y" * 70_000)
     assert len(passed) == 70_001
+
+
+@pytest.mark.parametrize(
+    ("damaged", "content", "words"),
+    [
+        ("router.key", "x", r"router\.key: found no private key in PEM"),
+        ("router.key", "daq.key", r"router\.key: found the key of another certificate"),
+        ("router.pem", "x", r"router\.pem: found no certificate in PEM"),
+        ("authority.pem", "x", r"authority\.pem: found no certificate in PEM"),
+    ],
+)
+def test_a_damaged_key_is_named_where_the_address_would_be_blamed(
+    damaged: str, content: str, words: str, keys: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "keys"
+    shutil.copytree(keys, folder)
+    source = keys / content
+    (folder / damaged).write_bytes(source.read_bytes() if source.is_file() else b"x")
+    config = SecuredRig(tmp_path, folder).config
+    with pytest.raises(KeysError, match=words):
+        open_router(config)
+
+
+@pytest.fixture(scope="module")
+def keys(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_keys(tmp_path_factory.mktemp("made") / "keys")
+
+
+def test_a_key_that_the_account_may_not_read_is_named(
+    keys: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("os.access", lambda path, _: Path(path).name != "daq.key")
+    config = SecuredRig(tmp_path, keys).config
+    with pytest.raises(KeysError, match=r"daq\.key: this account may not read it"):
+        connect(config, "daq", 0.1)

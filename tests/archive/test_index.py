@@ -1,5 +1,6 @@
 """The index of an archive: what is read, what is said, what is stored."""
 
+import os
 import shutil
 from datetime import datetime
 from pathlib import Path
@@ -97,17 +98,20 @@ def test_each_bad_session_has_a_sentence_and_the_rest_is_done(archive):
     (archive / "copy.mcap").write_bytes(whole)
     (archive / "foreign.mcap").write_bytes(b"no session at all")
     (archive / "empty.mcap").touch()
+    os.mkfifo(archive / "pipe.mcap")
     middle = bytearray(whole)
     middle[whole.find(CHUNK, whole.find(CHUNK) + 1) + len(CHUNK) + 30] ^= 0xFF
     (archive / "hurt.mcap").write_bytes(middle)
     write_session(archive / "open.mcap", start_s=50, close=False)
     done = index(Store(str(archive)))
-    expected = {"damaged": 1, "duplicate": 1, "ok": 2, "unfinished": 1, "unreadable": 2}
+    expected = {"damaged": 1, "duplicate": 1, "failed": 1, "ok": 2, "unfinished": 1}
+    expected["unreadable"] = 2
     assert done.statuses == expected
     said = dict(remark.split(": ", 1) for remark in done.remarks)
     assert said["copy.mcap"] == "is a copy of b.mcap"
     assert said["foreign.mcap"].startswith("holds no message of rigwatch: not an MCAP file")
     assert "empty.mcap" in said
+    assert said["pipe.mcap"].endswith("is no file")
     assert "are damaged" in said["hurt.mcap"]
     assert "is not closed: still being recorded, or cut off" in said["open.mcap"]
 

@@ -102,7 +102,7 @@ def test_a_second_writer_is_refused(root: Path) -> None:
             words = [*command, action[0], str(root), *action[1:]]
             done = subprocess.run(words, capture_output=True, text=True, check=False)
             assert done.returncode == 2
-            assert f"rigwatch: {root}: another process writes its index" in done.stderr
+            assert f"rigwatch: {root}: process {os.getpid()} writes its index" in done.stderr
     assert told(root) == before
     assert main(["archive", "index", str(root)]) == 0
 

@@ -4,7 +4,9 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import polars
@@ -175,3 +177,14 @@ def test_an_executor_that_is_not_there_is_reported_plainly(where, said, monkeypa
     monkeypatch.setattr("rigwatch.batch.dask_clients.CONNECT_S", 0.5)
     with pytest.raises(BatchError, match=said), executor_on(where):
         pass
+
+
+def test_what_answers_and_is_no_scheduler_is_not_awaited_for_ever(monkeypatch):
+    monkeypatch.setattr("rigwatch.batch.dask_clients.CONNECT_S", 0.2)
+    monkeypatch.setattr("rigwatch.batch.dask_clients.ANSWER_S", 0.2)
+    with ThreadingHTTPServer(("127.0.0.1", 0), BaseHTTPRequestHandler) as web:
+        threading.Thread(target=web.serve_forever, daemon=True).start()
+        where = f"dask://127.0.0.1:{web.server_port}"
+        with pytest.raises(BatchError, match=f"{where}: .*no scheduler"), executor_on(where):
+            pass
+        web.shutdown()

@@ -3,6 +3,7 @@
 import asyncio
 import os
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -187,3 +188,27 @@ def test_a_change_elsewhere_is_told_to_who_looks(desk: Desk) -> None:
         desks.close()
 
     asyncio.run(story())
+
+
+def test_a_disk_that_keeps_the_look_at_a_study_waiting_keeps_no_page_waiting(
+    tmp_path: Path,
+) -> None:
+    disk, reading, waited = threading.Event(), threading.Event(), []
+
+    def state(_: Path) -> int:
+        reading.set()
+        waited.append(not disk.wait(2.0))
+        return 0
+
+    async def story() -> None:
+        desks = Desks()
+        desks.of(tmp_path).listeners.listen()
+        watching = asyncio.create_task(desks.watch(state, 60.0))
+        await until(reading.is_set, "the look at the study")
+        disk.set()  # in its turn only if the loop, which answers pages, goes on meanwhile
+        await until(lambda: bool(waited), "the disk")
+        watching.cancel()
+        desks.close()
+
+    asyncio.run(story())
+    assert waited == [False]

@@ -2,12 +2,15 @@
 
 import signal
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rigwatch.wire.bus import Bus, sender
+from rigwatch.wire.bus.alarm_shares import STRANGERS_SHARE
+from rigwatch.wire.bus.complete_subscription import MOST_SENDERS
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.bus.message_ring import REPLY_BYTES, MessageRing
 from rigwatch.wire.bus.ring_questions import RingQuestions
@@ -21,6 +24,7 @@ from rigwatch.wire.messages import (
     EstimateBlock,
     Gap,
     encode,
+    remember,
 )
 from rigwatch.wire.ordering import OPEN, Ask, Numbered
 from tests.bus.rig import TestRig, answers, kill
@@ -220,6 +224,29 @@ def test_an_alarm_in_the_name_of_another_is_dropped_and_counted():
     say(monitor, range(1, 3))
     assert heard(listener, 2) == [0, 1, 2]
     assert (listener.foreign, listener.rejected) == (2, 2)
+
+
+def test_no_number_of_made_up_alarms_pushes_a_real_one_out() -> None:
+    network = MemoryNetwork()
+    strangers = [network.bus("r", f"stranger{number}") for number in range(20)]
+    monitor = network.bus("r", "monitor")
+    listener = network.bus("r", "listener").listen(ALARMS)
+    known: dict[str, Alarm] = {}
+
+    def said(bus: Bus, name: str) -> None:
+        standing = replace(alarm(0), name=name, state="unacknowledged", severity="critical")
+        bus.publish(ALARMS, standing)
+
+    said(monitor, "dry_friction")
+    for number in range(3000):
+        said(strangers[number % 20], f"made up {number}")
+    said(monitor, "stale")
+    for one in listener.drain():
+        remember(known, one)
+    assert {"dry_friction", "stale"} <= known.keys()
+    assert len(known) <= 2 + MOST_SENDERS * STRANGERS_SHARE
+    assert listener.foreign > 2000
+    assert {one.code for one in listener.reports()} == {"ALARMS REFUSED"}
 
 
 def test_what_a_process_said_is_heard_though_its_end_came_first(monkeypatch: pytest.MonkeyPatch):

@@ -103,3 +103,18 @@ def test_a_sample_that_is_sent_again_and_again_is_not_lost() -> None:
     for _ in range(70):
         tracker.accept(raw_of([98]))
     assert tracker.lost == 0
+
+
+def test_of_two_devices_on_one_line_one_is_read_and_the_other_counted() -> None:
+    tracker = SequenceTracker(256.0)
+    steps = []
+    for first in range(0, 512, 8):  # both take turns for two seconds
+        for boot in (1, 2):
+            steps += tracker.accept(raw_of([*range(first, first + 8)], boot))
+    assert [step.boot for step in steps if isinstance(step, Restart)] == [1, 2]
+    assert tracker.foreign == 512 - 8
+    later = [*range(512, 1280, 8)]  # the second is unplugged, and the first goes on
+    back = [step for at in later for step in tracker.accept(raw_of([*range(at, at + 8)], 1))]
+    assert [step.boot for step in back if isinstance(step, Restart)] == [1]
+    read = [seq for step in back if isinstance(step, RawBlock) for seq in step.seq.tolist()]
+    assert read == [*range(1023, 1280)]

@@ -113,3 +113,18 @@ def test_one_rig_named_twice_is_refused(tmp_path):
     twin.write_text(path.read_text())
     with pytest.raises(ConfigError, match=r"rig.id: found the same as in .*rig.toml"):
         Fleet([path, twin], 1.0)
+
+
+def test_a_wrong_configuration_hides_no_other_rig_and_joins_when_it_is_mended(tmp_path):
+    (tmp_path / "rig").mkdir()
+    right, wrong = rig_file(tmp_path / "rig", "a"), tmp_path / "wrong.toml"
+    wrong.write_text("rubbish = [")
+    fleet = Fleet([right, wrong], 0.1)
+    a, b = fleet.states()
+    assert (a.rig, b.rig) == ("a", "wrong.toml")
+    assert b.state.startswith(f"{wrong}: found ")
+    wrong.write_text(right.read_text().replace('id = "a"', 'id = "b"'))
+    assert [state.rig for state in fleet.states()] == ["a", "b"]
+    fleet.close()
+    with pytest.raises(ConfigError, match="no such file"):
+        Fleet([tmp_path / "none.toml"], 0.1)

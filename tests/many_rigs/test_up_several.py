@@ -13,7 +13,7 @@ from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.messages import HEALTH
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.session import open_session
-from rigwatch.wire.several_rigs import load_rigs
+from rigwatch.wire.several_rigs import valid_rigs
 from rigwatch.wire.typed_files import loads
 from sim_plant.serve.pty_line import PtyLine
 from sim_plant.serve.serial_server import SerialServer
@@ -142,15 +142,15 @@ def test_at_its_end_the_sessions_carry_the_whole_configuration(fleet):
 
 def test_rigs_with_keys_need_routers_of_their_own(tmp_path):
     paths = write_rigs(tmp_path)
-    names = [one.name for one in plan_several(load_rigs(paths))]
+    names = [one.name for one in plan_several(valid_rigs(paths))]
     assert names == ["router", "daq", "monitor", "recorder"]
     base = tmp_path / "base.toml"
     base.write_text(base.read_text() + '[bus.security]\nkeys = "keys"\n')
     with pytest.raises(ConfigError, match=r"two.toml: bus.listen: found the address of .*one.toml"):
-        plan_several(load_rigs(paths))
+        plan_several(valid_rigs(paths))
     other = f'[bus]\nlisten = "tcp/127.0.0.1:{free_port()}"\n'
     paths[1].write_text(paths[1].read_text() + other)
-    names = [one.name for one in plan_several(load_rigs(paths), ["recorder"])]
+    names = [one.name for one in plan_several(valid_rigs(paths), ["recorder"])]
     assert names == ["router one", "router two", "daq", "monitor"]
 
 

@@ -3,16 +3,19 @@
 import threading
 import time
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
 from monitor.alarms import Occasion
 from monitor.pipeline.rig_monitor import RigMonitor
+from monitor.process.key_watch import KeyWatch
 from monitor.process.link_watch import LinkWatch, Seen
 from monitor.process.loop import MonitorProcess, suitable_model
-from rigwatch.wire.access import signer_of
+from rigwatch.wire.access import REGISTER, Issued, Register, signer_of
 from rigwatch.wire.bus.commands.alarm_command import command_alarms
 from rigwatch.wire.bus.commands.alarm_list import ask_alarm_list
 from rigwatch.wire.bus.commands.command_check import signed
@@ -67,8 +70,10 @@ class Bench:
         self.bus = bus
 
     def kill(self) -> None:
-        """What a kill -9 leaves: nothing is closed or said."""
+        """What a kill -9 leaves: nothing is closed or said, and the kernel frees the lock."""
         self.bus.close()
+        if self.monitor._alone:
+            self.monitor._alone.give_up()
 
     def send(self, block: SampleBlock, *, kept_back: bool = False) -> None:
         self.ring.add(block)
@@ -183,6 +188,21 @@ def test_a_daq_that_is_gone_is_named(bench: Bench) -> None:
     assert wait_until(named, PATIENCE)
     standing = {alarm.name: alarm for alarm in ask_alarm_list(bench.observer)}
     assert "the daq process is not there" in standing["link"].cause
+
+
+def test_a_router_that_is_away_is_named_as_the_reason(bench: Bench) -> None:
+    bench.send(wave(0, 1, 7, 0))
+    bench.turn()
+    bench.network.up = False
+    bench.daq.close()
+
+    def named() -> bool:
+        bench.turn()
+        return "link" in {one.name for one in bench.monitor.rig.alarms.standing()}
+
+    assert wait_until(named, PATIENCE)
+    standing = {one.name: one for one in bench.monitor.rig.alarms.standing()}
+    assert standing["link"].cause.endswith("the router does not answer")
 
 
 def test_commands_are_obeyed_and_refusals_explained(bench: Bench) -> None:
@@ -351,6 +371,23 @@ def test_a_clock_that_was_set_is_noticed_and_one_that_runs_is_not() -> None:
     assert watch.clock_step(seen(4 - 30, 4)) == 0
 
 
+def test_certificates_that_end_are_an_alarm_until_they_are_issued_anew(tmp_path: Path) -> None:
+    watch, today = KeyWatch(str(tmp_path)), datetime(2026, 3, 1, tzinfo=UTC).timestamp()
+
+    def told(minutes: float, **ends: str) -> list[tuple[str, bool]]:
+        issued = tuple(Issued(name, name, 1, date) for name, date in ends.items())
+        (tmp_path / REGISTER).write_bytes(msgspec.json.encode(Register("bench", issued)))
+        found = watch.reports(seen(today, 60.0 * minutes))
+        return [(at.text, holds) for _, at, holds in found]
+
+    assert told(0, daq="2026-04-01", router="2028-01-01") == [("", False)]
+    assert told(1, daq="2026-03-31", router="2026-02-01") == [
+        ("router 2026-02-01, daq 2026-03-31", True)
+    ]
+    assert told(1.5) == [("router 2026-02-01, daq 2026-03-31", True)], "not read again yet"
+    assert told(2, daq="2028-03-01", router="2028-03-01") == [("", False)]
+
+
 def test_the_recorders_troubles_are_alarms_and_clear(bench: Bench) -> None:
     names = ("disk", "disk_almost_full", "recording_stopped")
     recorder = bench.network.bus("bench", "recorder")
@@ -373,6 +410,7 @@ def test_the_recorders_troubles_are_alarms_and_clear(bench: Bench) -> None:
     ("alarm", "state", "counters"),
     [
         ("line_noise", "garbage", {}),
+        ("duplicate_source", "two devices", {}),
         ("slow_device", "slow", {}),
         ("clock_drift", "running", {"drift_ppm": -600.0}),
         ("clock_wrong", "running", {"drift_ppm": 6000.0}),

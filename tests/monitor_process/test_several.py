@@ -8,6 +8,7 @@ import pytest
 
 from monitor.pipeline import RigMonitor
 from monitor.process.several import Seat, one_turn, run_several
+from rigwatch.commands import main
 from rigwatch.wire.bus import Bus
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.delivery import SampleRing
@@ -169,6 +170,14 @@ def test_a_wrong_file_is_named_and_its_rig_joins_once_it_is_right(tmp_path, monk
     path.write_text(right)
     assert wait_until(lambda: turned(lambda: seat.is_running), PATIENCE, 0.001)
     seat.close()
+
+
+def test_the_command_leaves_a_wrong_file_to_its_rig(tmp_path, monkeypatch):
+    monkeypatch.setattr("monitor.process.run_several", lambda _: 77)
+    wrong = tmp_path / "wrong.toml"
+    wrong.write_text("rubbish = [")
+    assert main(["monitor", str(rig_file(tmp_path, "a")), str(wrong)]) == 77
+    assert main(["monitor", str(wrong), str(wrong)]) != 77
 
 
 def test_two_configurations_of_one_rig_or_one_journal_are_refused(tmp_path):

@@ -1,5 +1,7 @@
 """A stranger on the bus: what he sends is refused, and the monitor goes on."""
 
+import errno
+import shutil
 import threading
 import time
 from collections.abc import Iterator
@@ -115,3 +117,25 @@ def test_a_position_that_no_device_reaches_is_none(tmp_path: Path, seq: int) -> 
     cursor.write(7, seq)
     assert cursor.read() is None
     assert (tmp_path / "p.set-aside").exists()
+
+
+@pytest.mark.parametrize("why", ["removed", "full"])
+def test_a_position_whose_file_is_gone_is_kept_in_a_new_one(
+    why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "state" / "p"
+    if why == "full":
+        monkeypatch.setattr("os.posix_fallocate", _refuse)
+    cursor = Cursor(path)
+    monkeypatch.undo()
+    cursor.write(7, 11)
+    if why == "removed":
+        shutil.rmtree(path.parent)
+    cursor.keep()
+    assert Cursor(path).read() == (7, 11)
+    cursor.write(7, 12)
+    assert Cursor(path).read() == (7, 12)
+
+
+def _refuse(*_: object) -> None:
+    raise OSError(errno.ENOSPC, "full")

@@ -1,11 +1,13 @@
 """Notices reach people by command, webhook and e-mail; what fails is repeated, counted and told."""
 
+import contextlib
 import json
 import socket
 import socketserver
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -136,6 +138,40 @@ def test_a_recipient_that_hangs_fills_only_its_own_queue(tmp_path: Path, webhook
     bench.turn()
     eventually(lambda: bench.counted("dropped") >= 19.0, "what does not fit is counted")
     assert bench.counted("waiting") <= delivery.WAITING
+
+
+def test_an_address_that_answers_without_end_fails_and_does_not_hold_what_follows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(delivery, "ADDRESS_S", 0.1)
+    monkeypatch.setattr(delivery, "RETRIES_S", ())
+    with Drip() as drip:
+        url = f"json://127.0.0.1:{drip.server_address[1]}"
+        bench = Bench(tmp_path, f'[[recipients]]\nname = "hook"\nurl = "{url}"\n')
+        for name in ("loss", "stale"):
+            bench.monitor.publish(ALARMS, fault(name))
+        eventually(lambda: bench.counted("given_up") == 2.0, "both have failed")
+        assert bench.health is not None
+        assert bench.health.text == "notifications to hook fail"
+        drip.shutdown()
+
+
+class Drip(socketserver.ThreadingTCPServer):
+    """A server whose answer has no end."""
+
+    daemon_threads = True
+
+    def __init__(self) -> None:
+        super().__init__(("127.0.0.1", 0), _Dripping)
+        threading.Thread(target=self.serve_forever, daemon=True).start()
+
+
+class _Dripping(socketserver.BaseRequestHandler):
+    def handle(self) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                self.request.sendall(b"H")
+                time.sleep(0.05)
 
 
 def test_a_command_that_hangs_is_killed_with_what_it_has_started(

@@ -19,6 +19,7 @@ from rigwatch.wire.messages import (
     EstimateBlock,
 )
 from rigwatch.wire.rig_config import SecuritySection, WitnessSection
+from rigwatch.witness.kept_alarm import KeptAlarm
 from rigwatch.witness.process import Witness
 from rigwatch.witness.stale_alarm import StaleAlarm
 from tests.bus.rig import TestRig, stopped
@@ -61,13 +62,43 @@ def test_a_silent_monitor_is_an_alarm_that_clears_and_stands_in_the_list(tmp_pat
     assert [one.state for one in ask_alarm_list(screen)] == ["cleared_unacknowledged"]
 
 
+def test_a_monitor_that_is_not_heard_for_want_of_a_router_says_so() -> None:
+    network = MemoryNetwork()
+    witness = Witness(WitnessSection(), network.bus("r", "witness"), 0.0)
+    network.up = False
+    witness.turn(31.0, 1)
+    network.up = True
+    (standing,) = ask_alarm_list(network.bus("r", "dashboard"))
+    assert standing.cause.endswith("the router does not answer")
+
+
+def test_a_witness_that_is_killed_leaves_no_alarm_behind_and_hides_none(tmp_path: Path) -> None:
+    network, kept = MemoryNetwork(), KeptAlarm(tmp_path / "alarms.jsonl.stale")
+    monitor, page = network.bus("r", "monitor"), network.bus("r", "dashboard").subscribe(ALARMS)
+
+    bus = network.bus("r", "witness")
+    Witness(WitnessSection(), bus, 0.0, kept=kept).turn(31.0, 1)
+    bus.close()  # as the kernel does for a killed one
+    second = Witness(WitnessSection(), network.bus("r", "witness"), 0.0, kept=kept)
+    second.turn(0.1, 2)
+    assert [one.state for one in page.drain()] == ["unacknowledged"], "no estimate has come"
+    monitor.publish(ESTIMATES, estimates(0))
+    second.turn(0.2, 3)
+    assert [one.state for one in page.drain()] == ["cleared_unacknowledged"]
+    standing = kept.read()
+    assert standing is not None
+    assert standing.state == "cleared_unacknowledged"
+
+
 def test_a_silence_that_is_over_stands_until_somebody_has_seen_it(tmp_path: Path) -> None:
     network, secret = MemoryNetwork(), SecuritySection(secret=str(tmp_path / "secret"))
     stale = StaleAlarm(CommandCheck(network.bus("r", "monitor"), secret))
     ann = network.bus("r", "ann", signer_of(secret, ""))
     command = signed(ann, AlarmCommand(MONITOR_STALE, "acknowledge", "ann", 3))
-    said = [*stale.judge(True, 1.1, 1), *stale.judge(False, 0.0, 2), *stale.judge(False, 0.0, 3)]
+    said = [*stale.judge(True, 1.1, 1, lambda: "no router"), *stale.judge(False, 0.0, 2)]
+    said += [*stale.judge(False, 0.0, 3)]
     assert [one.state for one in said] == ["unacknowledged", "cleared_unacknowledged"]
+    assert said[0].cause.endswith("for 1.1 s; no router")
     assert [one.state for one in stale.judge(True, 1.1, 4)] == ["unacknowledged"]
     assert [one.state for one in stale.judge(False, 0.0, 5)] == ["cleared_unacknowledged"]
     assert [getattr(one, "state", one) for one in stale.command(command, 6)] == ["normal"]

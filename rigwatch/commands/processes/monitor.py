@@ -17,10 +17,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Monitor until a signal ends it."""
-    from rigwatch.wire.rig_config import load_rig
+    from rigwatch.wire.several_rigs import valid_rigs
 
-    for config in arguments.config:
-        load_rig(config)  # report a wrong file before kernels load, which takes seconds
+    valid_rigs(arguments.config)  # report a wrong file before kernels load, which takes seconds
     from monitor.process import run as run_monitor
     from monitor.process import run_several
 

@@ -10,7 +10,7 @@ account_proof   the same without keys, with a secret of the account (`account_se
 proving         which of the two a rig uses
 """
 
-from rigwatch.wire.access.access_list import access_settings
+from rigwatch.wire.access.access_list import access_settings, alarm_roles
 from rigwatch.wire.access.certificates import (
     certificate_name,
     check_exposure,
@@ -34,7 +34,14 @@ from rigwatch.wire.access.register import (
 )
 from rigwatch.wire.access.signing import Signer
 from rigwatch.wire.access.statement import names_a_person
-from rigwatch.wire.access.validity import days_left, ending_soon, endings_text, in_force
+from rigwatch.wire.access.validity import (
+    days_left,
+    ending_soon,
+    endings_text,
+    ends_text,
+    in_force,
+    keys_trouble,
+)
 from rigwatch.wire.access.verifying import Verifier
 
 __all__ = [
@@ -47,14 +54,17 @@ __all__ = [
     "Signer",
     "Verifier",
     "access_settings",
+    "alarm_roles",
     "authority_file",
     "certificate_name",
     "check_exposure",
     "days_left",
     "ending_soon",
     "endings_text",
+    "ends_text",
     "in_force",
     "key_files",
+    "keys_trouble",
     "names_a_person",
     "operator_name",
     "read_register",

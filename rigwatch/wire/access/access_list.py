@@ -55,6 +55,11 @@ _MESSAGES = [
 ]  # fmt: skip
 
 
+def alarm_roles() -> tuple[str, ...]:
+    """The processes of a rig that say alarms."""
+    return tuple(role for role, keys in _SAYS.items() if ALARMS.key in keys)
+
+
 def access_settings(bus: BusSection, rig: str) -> dict[str, Any]:
     """The router's access settings; none without keys.
 

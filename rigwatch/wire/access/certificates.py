@@ -1,6 +1,7 @@
 """The certificates that processes use: mutual TLS of the bus, and who the operator is."""
 
 import getpass
+import os
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +54,8 @@ def tls_settings(bus: BusSection, name: str, *, listens: bool = False) -> dict[s
     for path in (authority_file(folder), public, private):
         if not path.is_file():
             raise KeysError(f"{path}: no such file; `rigwatch keys issue {name}` makes it")
+        if not os.access(path, os.R_OK):
+            raise KeysError(f"{path}: this account may not read it, expected to")
     side = "listen" if listens else "connect"
     return {
         "transport/link/tls/root_ca_certificate": str(authority_file(folder)),

@@ -16,6 +16,8 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
+from rigwatch.wire.access import alarm_roles
+from rigwatch.wire.bus.alarm_shares import AlarmShares
 from rigwatch.wire.bus.inbox import Inbox
 from rigwatch.wire.bus.member import Member
 from rigwatch.wire.bus.message_ring import SAID_KEY, ring_key
@@ -25,7 +27,7 @@ from rigwatch.wire.bus.subscription import QUEUE_CAPACITY, Subscription
 from rigwatch.wire.bus.tokens import EarlyMessages
 from rigwatch.wire.bus.transport import MAX_PAYLOAD
 from rigwatch.wire.errors import MessageError
-from rigwatch.wire.messages import EVENTS, GAPS, Event, Gap, Topic, decode, decode_all
+from rigwatch.wire.messages import ALARMS, EVENTS, GAPS, Event, Gap, Topic, decode, decode_all
 from rigwatch.wire.ordering import OPEN, Ask, Loss, Numbered, Outcome, Remark, RingReply
 
 SILENCE = 0.5
@@ -53,7 +55,8 @@ class CompleteSubscription(Subscription):
 
     Attributes:
         lost: messages known to be lost.
-        foreign: messages dropped because their sender does not own the run.
+        foreign: messages dropped because their sender does not own the run, or has said too many
+            different alarms.
     """
 
     def __init__(
@@ -83,6 +86,7 @@ class CompleteSubscription(Subscription):
         # The earlier run knew every process of its time.
         self._began_ns = time.time_ns() if resume_after is None else 0
         self._looked_at = time.monotonic()
+        self._shares = AlarmShares() if topic is ALARMS else None
         self._questions = RingQuestions(bus, self._answered)
         self._start(dict(resume_after or {}))
 
@@ -290,7 +294,8 @@ class CompleteSubscription(Subscription):
 
     def _follow(self, process: str, place: Place) -> bool:
         """Follow a further process, unless the limit is reached."""
-        if len(self._senders) >= MOST_SENDERS:
+        # Strangers that come first leave room for those who say alarms.
+        if len(self._senders) >= MOST_SENDERS and process not in alarm_roles():
             return False
         self._senders[process] = Sender(place, patient=self._patient)
         return True
@@ -334,7 +339,7 @@ class CompleteSubscription(Subscription):
     def _handle(self, process: str, outcomes: list[Outcome[Numbered]]) -> None:
         for outcome in outcomes:
             if isinstance(outcome, Numbered):
-                self._deliver(outcome)
+                self._deliver(process, outcome)
             elif isinstance(outcome, Ask):
                 self._questions.ask(ring_key(process, self.topic), outcome)
             elif isinstance(outcome, Loss):
@@ -342,9 +347,15 @@ class CompleteSubscription(Subscription):
             elif outcome.severity == "error":
                 self._remark(process, outcome)
 
-    def _deliver(self, message: Numbered) -> None:
+    def _deliver(self, process: str, message: Numbered) -> None:
         self._looked_at = time.monotonic()
-        self._ready.append(message.payload)
+        if self._shares is None or self._shares.admits(process, message.payload):
+            self._ready.append(message.payload)
+            return
+        if self._shares.is_first_refusal(process):
+            text = f"{process} has said more alarms than a rig has; further ones are dropped"
+            self._remark(process, Remark("error", "ALARMS REFUSED", text))
+        self.foreign += 1
 
     def _miss(self, process: str, loss: Loss) -> None:
         gap = Gap(

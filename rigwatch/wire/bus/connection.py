@@ -13,12 +13,13 @@ from rigwatch.wire.access import (
     access_settings,
     certificate_name,
     check_exposure,
+    keys_trouble,
     signer_of,
     tls_settings,
 )
 from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.bus.transport import Close
-from rigwatch.wire.errors import NoRouterError
+from rigwatch.wire.errors import BusError, KeysError, NoRouterError
 from rigwatch.wire.rig_config import RigConfig
 
 if TYPE_CHECKING:
@@ -119,7 +120,13 @@ def connect(
     name = certificate_name(config.bus, process)
     tls = dict(tls_settings(config.bus, name))
     made = links.transport if links else _client
-    transport = made(config.bus.router, timeout, config.bus.lease, tls, stop)
+    try:
+        transport = made(config.bus.router, timeout, config.bus.lease, tls, stop)
+    except NoRouterError as error:
+        # The refusal of a certificate looks to a client as if nobody were there.
+        if why := keys_trouble(config.bus.security, name):
+            raise NoRouterError(f"no connection to {config.bus.router}: {why}") from error
+        raise
     signer = signer_of(config.bus.security, name)
     megabytes = config.bus.ring_megabytes
     if links:
@@ -193,6 +200,7 @@ def open_router(config: RigConfig) -> Close:
 
     Raises:
         BusError: the endpoint is malformed or already in use.
+        KeysError: a certificate or key is missing or cannot be used.
         ConfigError: the bus would be open to a network without keys.
     """
     from rigwatch.wire.bus import zenoh_transport
@@ -203,6 +211,11 @@ def open_router(config: RigConfig) -> Close:
     )
     if config.bus.links:
         secured |= tls_settings(config.bus, "router")
-    return zenoh_transport.open_router(
-        config.bus.listen, config.bus.lease, secured, config.bus.links
-    )
+    try:
+        return zenoh_transport.open_router(
+            config.bus.listen, config.bus.lease, secured, config.bus.links
+        )
+    except BusError:
+        if why := keys_trouble(config.bus.security, "router"):
+            raise KeysError(why) from None
+        raise

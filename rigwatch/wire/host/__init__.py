@@ -5,7 +5,7 @@ from rigwatch.wire.host.disk_space import free_share
 from rigwatch.wire.host.ending import set_at_hangup, set_at_signal
 from rigwatch.wire.host.few_pools import use_few_pools
 from rigwatch.wire.host.heartbeat import Heartbeat
-from rigwatch.wire.host.one_keeper import hold
+from rigwatch.wire.host.one_keeper import Hold, Kept
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
 from rigwatch.wire.host.processes import end_process, end_with_parent, last_line
 from rigwatch.wire.host.realtime import DAQ, MONITOR, ROUTER, prepare_for_real_time, raise_priority
@@ -17,6 +17,8 @@ __all__ = [
     "MONITOR",
     "ROUTER",
     "Heartbeat",
+    "Hold",
+    "Kept",
     "Part",
     "Pulse",
     "RigPulse",
@@ -28,7 +30,6 @@ __all__ = [
     "free_port",
     "free_ports",
     "free_share",
-    "hold",
     "is_free",
     "last_line",
     "prepare_for_real_time",
