@@ -5,7 +5,7 @@ jitter or are held, and edges between samples, where the motion has to tell.
 from monitor.drives.bridged_edges import BridgedEdges
 from monitor.drives.drive_changes import Drive, DriveChanges
 from monitor.drives.drive_stops import DriveStops
-from monitor.drives.edge_choice import corrected, edges_unsure, follow_edges, no_edges
+from monitor.drives.edge_choice import corrected, edges_unsure, follow_edges, no_edges, undecided
 from monitor.drives.held_readings import HeldReadings
 from monitor.drives.input_steps import InputSteps, Steps
 from monitor.drives.jittered_edges import JitteredEdges
@@ -44,4 +44,5 @@ __all__ = [
     "no_edges",
     "same_drive",
     "steady_energies",
+    "undecided",
 ]

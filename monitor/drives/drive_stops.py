@@ -13,23 +13,27 @@ from rigwatch.wire.kernel import kernel
 
 FLAT = 0.005
 """Change between samples, relative to the recent range, that is none: a loop still drifts."""
+SLOW = 0.1
+"""The same relative to the recent largest change: below half a hertz a tone changes by less."""
 LONGER, LEAST = 1.5, 3.0
 """A stop is a stay longer than the usual one by this factor and this many samples."""
 PAUSE, TWICE = 256.0, 2.0
 """A stay is usual from its first time on if it is no longer than this [samples] or than the usual
 one by this factor: the half period of a square is, a stop is not.
 """
-RANGE_MEMORY, STAY_MEMORY = 256.0, 2048.0
+RANGE_MEMORY, STAY_MEMORY = 256.0, 4096.0
 """Changes in which the recent range, and samples in which the usual stay, become a new drive's."""
-LAST, LOW, HIGH, STAY, USUAL = range(5)
-"""Carried figures: the last sample, the recent range, how long the input stays, and usually."""
+LAST, LOW, HIGH, STEEP, STAY, USUAL = range(6)
+"""Carried figures: the last sample, the recent range and largest change, how long the input stays,
+and usually.
+"""
 
 
 class DriveStops:
     """Follows one input, block by block."""
 
     def __init__(self) -> None:
-        self._kept = np.zeros(5)
+        self._kept = np.zeros(6)
 
     def update(self, signal: FloatArray, code: Codes) -> BoolArray:
         """Where an input of shape (n,) is found to have stopped, shape (n,)."""
@@ -46,17 +50,20 @@ def _advance(signal: FloatArray, code: Codes, kept: FloatArray, found: NDArray[n
         value = signal[k]
         if code[k] == RESTART or code[k] == NEW_BOOT:
             kept[LAST] = kept[LOW] = kept[HIGH] = value
-            kept[STAY] = kept[USUAL] = 0.0
+            kept[STEEP] = kept[STAY] = kept[USUAL] = 0.0
         kept[LOW], kept[HIGH] = min(value, kept[LOW]), max(value, kept[HIGH])
         extent = kept[HIGH] - kept[LOW]
         kept[USUAL] -= kept[USUAL] / STAY_MEMORY
-        moves = abs(value - kept[LAST]) > FLAT * extent
+        change = abs(value - kept[LAST])
         kept[LAST] = value
+        kept[STEEP] = max(kept[STEEP], change)
+        moves = change > min(FLAT * extent, SLOW * kept[STEEP])
         if moves:
             longest = max(TWICE * kept[USUAL], PAUSE)
             kept[USUAL] = max(kept[USUAL], min(kept[STAY], longest))
             kept[LOW] = min(value, kept[LOW] + extent / RANGE_MEMORY)
             kept[HIGH] = max(value, kept[HIGH] - extent / RANGE_MEMORY)
+            kept[STEEP] -= kept[STEEP] / RANGE_MEMORY
             kept[STAY] = 0.0
             continue
         before, allowed = kept[STAY], LONGER * kept[USUAL] + LEAST

@@ -35,7 +35,7 @@ OUTPUTS = (
 USUAL_LASTING, USUAL_SHORT, USUAL_MEDIUM, USUAL_FRICTION = range(4)
 """Rows of the healthy residual's extremes at the present motion, see `usual_error.Extremes`."""
 
-ERROR, DRY, WET, LEVEL, DISAGREE, MEASURED, DRIVEN, LATENESS, SPEED, LEVELS = range(10)
+ERROR, DRY, WET, LEVEL, DISAGREE, MEASURED, DRIVEN, LATENESS, UNDECIDED, SPEED, LEVELS = range(11)
 """Columns of the history; from `LEVELS` on, the levels on which the healthy variance depends."""
 
 

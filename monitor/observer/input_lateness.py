@@ -19,8 +19,10 @@ from numba import njit
 from monitor.observer.missing_force import DRY_UNIT, LATE_UNIT, E
 from rigwatch.wire.arrays import FloatArray
 
-MOST = 1.0
-"""Largest lateness [samples]."""
+MOST = 1.25
+"""Largest lateness [samples]: that of a held voltage, and what the response, which is that to later
+inputs, lacks for earlier ones.
+"""
 QUICK, SLOW = 32.0, 128.0
 """Memory of what it is learnt from, before and while the rig is judged [samples]."""
 EXPLAINS, REST = 0.85, 0.25
@@ -39,6 +41,10 @@ UNSURE = 0.15
 """Relative error of the response: equations fitted to one lateness are less accurate at another."""
 UNSTEADY = 0.2
 """Lateness, and change of it, that matters [samples]."""
+GROWS = 0.6
+"""Ratio of the lateness of the slow memory to that of the quick one above which it has grown since
+long before: a sudden one reaches it only after the slow memory, a clock's slide at once.
+"""
 SHOWN, RECENT = 128.0, 4096.0
 """Samples for which a lateness must be found to count, as at a start there may be a false one; and
 those after which one no longer found is forgotten: the longest interval between skips.
@@ -81,7 +87,7 @@ def follow_lateness(  # noqa: PLR0917 -- a kernel
     """
     if learns:
         _learn(row, kept)
-    first = OF_SLOW if judging and not is_late(kept) else OF_QUICK
+    first = OF_SLOW if judging and not is_late(kept) and not slides(kept) else OF_QUICK
     energy, found = kept[first + ERRORS], _best(kept, first)
     least = (1.0 - EXPLAINS) * energy + REST * largest
     if anew:
@@ -115,6 +121,19 @@ def _average(value: float, place: int, memory: float, kept: FloatArray) -> None:
 def is_late(kept: FloatArray) -> bool:
     """Whether there is or was a lateness, which may change."""
     return kept[AGO] < RECENT
+
+
+@njit()
+def slides(kept: FloatArray) -> bool:
+    """Whether a lateness has grown slowly: the edges of a clock that is almost the rate's.
+
+    It explains nearly all of the newest samples, more than dry friction does.
+    """
+    found, before = _best(kept, OF_QUICK), _best(kept, OF_SLOW)
+    grown = abs(found) > UNSTEADY and before * np.sign(found) > GROWS * abs(found)
+    left = _left(found, kept, OF_QUICK)
+    explains = left < (1.0 - EXPLAINS) * kept[OF_QUICK + ERRORS]
+    return grown and explains and RATHER * left < _rubbing(kept, OF_QUICK)
 
 
 @njit()

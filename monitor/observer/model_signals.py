@@ -196,6 +196,9 @@ class ObserverSignals:
 
     def follow(self, remainder: RemainderSection) -> None:
         """Use another remainder from the next sample, which must be the first after a start."""
+        # A remainder without weights is none, and its centre no mean of the hidden states.
+        usual = np.array(remainder.centre[len(self.layout.motions) :])
+        self._along.follow(usual if np.any(remainder.weights) else None)
         self._high_passed = HighPassed(self._corner, self._rate, remainder)
 
     def update(self, signals: FloatArray, code: Codes) -> Observed:

@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from monitor.drives import corrected, edges_unsure, follow_edges
+from monitor.drives import corrected, edges_unsure, follow_edges, undecided
 from monitor.observer.decision_state import (
     AMPLITUDE,
     ARMING,
@@ -48,6 +48,7 @@ from monitor.observer.decision_state import (
     SPEED,
     SPREAD,
     STICKING,
+    UNDECIDED,
     UNNAMED,
     USUAL_FRICTION,
     USUAL_LASTING,
@@ -67,6 +68,7 @@ from monitor.observer.input_lateness import (
     is_late,
     lateness_changes,
     rubs,
+    slides,
 )
 from monitor.observer.lagged_motion import EMPTY, FIRST, TAINTED
 from monitor.observer.missing_force import LATE_UNIT, MOVED, UNSURE_INPUT, E
@@ -203,13 +205,14 @@ def _follow_inputs(
     calm = count[ONSET] < 0
     largest = min(rules.medium / rules.lasting, usual[USUAL_MEDIUM])
     variance = _variance(kept, rules) if calm or not judging else 0.0
-    if calm and follow_edges(row[E], row[MOVED], largest * variance, kept.edges):
+    if calm and follow_edges(row[E], row[MOVED], row[UNSURE_INPUT], largest * variance, kept.edges):
         forget_lateness(kept.lateness)
         count[CHANGED] = 0
     row[E] = corrected(row[E], row[MOVED], kept.edges)
     count[KNOWN_AGO] = 0 if np.isinf(usual[USUAL_MEDIUM]) else count[KNOWN_AGO] + 1
     anew = 0 < count[KNOWN_AGO] <= LONG
-    learns = not judging or (calm and (count[ABOVE] == 0 or is_late(kept.lateness)))
+    moves = is_late(kept.lateness) or slides(kept.lateness)
+    learns = not judging or (calm and (count[ABOVE] == 0 or moves))
     if learns or (calm and anew):
         variance += edges_unsure(row[UNSURE_INPUT], kept.edges)
         follow_lateness(row, largest * variance, judging, learns, anew, kept.lateness)
@@ -227,6 +230,7 @@ def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatA
     kept.rows[head, ERROR] = row[ERROR] - late
     kept.rows[head, LATENESS] = np.hypot(UNSURE * late, row[UNSURE_INPUT])
     kept.rows[head, SPEED] = speed
+    kept.rows[head, UNDECIDED] = undecided(row[MOVED], kept.edges)
     for c in range(levels.size):
         kept.rows[head, LEVELS + c] = levels[c]
     kept.counts[HEAD] = (head + 1) % HISTORY
@@ -272,7 +276,7 @@ def _one(  # noqa: PLR0917 -- a kernel
     count[SINCE_START] += 1
     count[OUTSIDE] = 0 if not inside else min(count[OUTSIDE] + 1, LONG)
     out[AMPLITUDE, k] = mean_square(kept, LEVEL, MEDIUM)
-    spread = np.sqrt(_variance(kept, rules))
+    spread = np.sqrt(_variance(kept, rules) + mean_square(kept, UNDECIDED, MEDIUM))
     out[SPREAD, k] = spread
     force, viscous, deviations, _, _ = friction(kept, MEDIUM, spread)
     out[FORCE, k], out[VISCOUS, k], out[DEVIATIONS, k] = force, viscous, deviations

@@ -165,8 +165,14 @@ class AlongMotion:
         cases = [healthy, *(healthy | {name: healthy[name] + 1.0} for name in strengths)]
         self._parameters = [self._compiled.vector(case) for case in (*cases, *[healthy] * 3)]
         self._states = [np.zeros(0)] * len(self._parameters)
+        self._usual: FloatArray | None = None
+        self._slow = plant.turn
         self._last = np.zeros((4, 0))
         self._pause = -1
+
+    def follow(self, usual: FloatArray | None) -> None:
+        """Use these means of the hidden states of a healthy rig, shape (hidden,), if known."""
+        self._usual = usual
 
     def update(
         self,
@@ -206,7 +212,7 @@ class AlongMotion:
                 begin += 1
                 continue
             if state[begin] == FIRST:
-                self._begin(rows[begin])
+                self._begin(rows[begin], steps[begin])
             end = _end(state, moves, begin)
             given = [each[begin:end] for each in (rows, weaker, later, between)]
             begin += self._run(given, bool(moves[begin]), begin, out)
@@ -226,9 +232,18 @@ class AlongMotion:
             elif state[k] != EMPTY:
                 state[k], self._pause = FIRST, -1
 
-    def _begin(self, row: FloatArray) -> None:
-        """Hidden states in equilibrium with a row, with the motion at rest."""
+    def _begin(self, row: FloatArray, steps: FloatArray) -> None:
+        """Hidden states at a row: in equilibrium with it at rest, else the means of a healthy rig.
+
+        An instant of a drive is no equilibrium: at its crest the mean of an AC-coupled sensor would
+        begin with the acceleration that a lasting crest causes, and forget it only with the
+        sensor's corner.
+        """
         self._last = np.stack([row] * 4)
+        moves = np.abs(row[self._rates]).max(initial=0.0) > self._slow or np.any(steps)
+        if self._usual is not None and moves:
+            self._states = [self._usual] * len(self._parameters)
+            return
         still = np.repeat(row[None, :], round(SETTLING / self._dt), axis=0)
         still[:, self._rates] = 0.0
         for case, parameters in enumerate(self._parameters):

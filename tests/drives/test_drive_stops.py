@@ -42,6 +42,20 @@ def test_a_stop_is_seen_within_the_motions_next_swing(name: str, noise: float, l
     assert found[0] < 32
 
 
+@pytest.mark.parametrize("hertz", [0.15, 0.25, 0.35])
+@pytest.mark.parametrize("turn", [0.0, 0.25, 0.6])
+def test_a_slow_tone_is_seen_to_stop_and_not_before(hertz: float, turn: float) -> None:
+    # Below 0.4 Hz it changes by less than half a percent of its range between samples.
+    at = np.arange(6144)
+    stop = 4096
+    tone = np.sin(2.0 * np.pi * (hertz * at / RATE + turn))
+
+    found = np.flatnonzero(stops(np.where(at < stop, tone, tone[stop])))
+
+    assert not ((found > 1.5 * RATE / hertz) & (found < stop)).any()
+    assert 0 <= found[-1] - stop < 32
+
+
 def test_a_second_stop_is_seen() -> None:
     signal = np.where((AT // 512) % 2 == 0, DRIVES["tone"], 0.0)
 

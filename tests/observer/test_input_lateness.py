@@ -11,6 +11,7 @@ from monitor.observer.input_lateness import (
     lateness_changes,
     no_lateness,
     rubs,
+    slides,
 )
 from monitor.observer.missing_force import COLUMNS, DRY_UNIT, LATE_UNIT, E
 
@@ -39,6 +40,21 @@ def test_lateness_is_found(tau) -> None:
     assert kept[TAU] == pytest.approx(tau, abs=0.05)
     assert is_late(kept)
     assert not lateness_changes(kept)
+
+
+@pytest.mark.parametrize(("since", "grows"), [(512, True), (16, False), (48, False)])
+def test_a_lateness_that_grows_slowly_is_told_from_a_sudden_one(since, grows) -> None:
+    # A clock that is 0.1 % off moves its edges by half a sample in two seconds.
+    tau = np.where(np.arange(N) < N - since, 0.0, np.linspace(-0.5, 0.5, N) if grows else 0.5)
+    rows = np.zeros((N, len(COLUMNS)))
+    rows[:, E] = tau * LATE + NOISE * np.random.default_rng(8).standard_normal(N)
+    rows[:, LATE_UNIT], rows[:, DRY_UNIT] = LATE, DRY
+    kept = no_lateness()
+    for row in rows:
+        follow_lateness(row, NOISE**2, True, True, False, kept)
+
+    assert slides(kept) == grows
+    assert (kept[TAU] > 0.4) == grows
 
 
 def test_friction_is_not_learnt_as_lateness() -> None:
