@@ -25,7 +25,7 @@ from rigwatch.workbench.ranking import (
     accepted_from,
     no_progress,
     rank_only,
-    refit,
+    refit_nested,
     shapes_of,
 )
 from rigwatch.workbench.study import (
@@ -305,7 +305,7 @@ def _port(study: Study, name: str, port: str | None) -> str:
 def _tried(bench: Bench, effect: str, port: str) -> Ranked:
     found = shapes_of(bench.study, bench.data.train, effect, port)
     row = rank_only(bench.study, bench.data, bench.base, found)
-    refit(bench.study, bench.data, bench.base, row)
+    refit_nested(bench.study, bench.data, bench.base, [row])
     if row.fitted is None:
         raise ModelError(f"{row.label}: cannot be fitted: {row.failure}")
     return row
