@@ -199,6 +199,25 @@ def test_an_effect_that_leads_on_the_recordings_held_out_alone_is_not_named(
     )
 
 
+@pytest.mark.parametrize(
+    ("training", "free", "named"),
+    [
+        pytest.param(2.0, 1, "b@x", id="leaves less of all"),
+        pytest.param(2.6, 1, "coulomb@load", id="leaves more of all"),
+        pytest.param(2.0, 2, "coulomb@load", id="no simpler"),
+    ],
+)
+def test_a_parameter_more_that_pays_held_out_alone_is_not_named(
+    training: float, free: int, named: str
+) -> None:
+    only = trained(best(error=1.5, family="drag", free=2), 2.4)
+    simpler = trained(row("b@x", 1.6, family="drag", free=free), training)
+    found = judge(replace(base(), train=base(2.9).train), [only, simpler], QUIET)
+    assert found.word == "missing_effect"
+    assert found.best is not None
+    assert found.best.label == named
+
+
 def test_what_hardly_lowers_the_training_error_is_not_named_with_confidence() -> None:
     near, only = base(1.3), best(error=1.1)
     assert judge(near, [only], QUIET).word == "missing_effect"
