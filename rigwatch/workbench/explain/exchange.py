@@ -23,7 +23,7 @@ from rigwatch.workbench.ranking import (
     refit_nested,
     shapes_of,
 )
-from rigwatch.workbench.study import Study, drop_effect
+from rigwatch.workbench.study import Study, drop_effect, told
 
 MOST_TRIED = 10
 """Largest number of effects of a kind that are fitted in place of one."""
@@ -41,7 +41,7 @@ class Exchange:
     Attributes:
         effect, port: the effect that fits better.
         instead_of: the accepted effect at that port.
-        held_out_error: with the exchange, in the unit of the study's errors.
+        held_out_error: with the exchange, in the SI unit of the study's errors.
         p_value: one-sided, of so large a fall of the held-out error by chance; corrected for the
             number of effects tried.
     """
@@ -56,7 +56,7 @@ class Exchange:
         """The offer in words, with the commands that take it in the study's folder."""
         return (
             f"{self.effect}@{self.port} in place of {self.instead_of}@{self.port} lowers"
-            f" the held-out error to {self.held_out_error:.3g} {unit}"
+            f" the held-out error to {told(self.held_out_error, unit):.3g} {unit}"
             f" (rigwatch undo {study}, then rigwatch add {study} {self.effect} --port {self.port})"
         )
 

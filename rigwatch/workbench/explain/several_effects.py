@@ -124,7 +124,7 @@ def _with_best_set(verdict: Verdict, best: Combination, every: Sequence[Combinat
     if verdict.word not in UNNAMED or len(best.rows) == 1:
         return verdict
     text = f"{verdict.text}; {_joined(best.labels)} together leave"
-    text += f" {best.fitted.held_out_error:.3g} {best.fitted.error_unit}"
+    text += f" {best.fitted.told_error:.3g} {best.fitted.told_in}"
     equals = [each.labels for each in every if not_worse(each, best)]
     common = frozenset.intersection(*equals)
     if common and common != best.labels:

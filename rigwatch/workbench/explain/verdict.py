@@ -195,9 +195,10 @@ def _word(
         return "undetermined", (
             f"{best.label} and {', '.join(rivals)} explain this recording equally well"
         )
+    assert best.fitted is not None
     return "missing_effect", (
-        f"{best.label} is missing: the held-out error falls from {base.held_out_error:.3g} to"
-        f" {best.held_out_error:.3g} {base.error_unit}"
+        f"{best.label} is missing: the held-out error falls from {base.told_error:.3g} to"
+        f" {best.fitted.told_error:.3g} {base.told_in}"
     )
 
 

@@ -32,7 +32,7 @@ def leaving(squares: np.ndarray, outputs: int = 1) -> Fitted:
     known: dict[str, dict[str, Any]] = {"ports": {}, "quantities": {}}
     model = SimpleNamespace(
         driving=lambda: ("u",),
-        outputs={str(k): SimpleNamespace(unit="mm") for k in range(outputs)},
+        outputs={str(k): SimpleNamespace(unit="N", shown="") for k in range(outputs)},
         **known,
     )
     compiled: Any = SimpleNamespace(system=SimpleNamespace(model=model))
@@ -132,7 +132,7 @@ def test_the_only_effect_that_helps_is_missing() -> None:
     found = judge(base(3.0), [only, row("b@x", accepted=False, cosines={})], PERIODS)
     assert (found.word, found.best, found.members) == ("missing_effect", only, ("coulomb@load",))
     assert (found.rivals, found.second) == ((), ())
-    assert found.text == ("coulomb@load is missing: the held-out error falls from 3 to 1.05 mm")
+    assert found.text == ("coulomb@load is missing: the held-out error falls from 3 to 1.05 N")
     assert found.evidence.left == pytest.approx((1.05**2 - 1) / (3**2 - 1))
     assert found.probability_wrong == probability_wrong("missing_effect", found.evidence)
 
