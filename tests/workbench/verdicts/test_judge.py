@@ -11,6 +11,7 @@ from rigwatch.physics.engine.equations import Placement
 from rigwatch.physics.engine.fit import Fit
 from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.data import NoiseFloor
+from rigwatch.workbench.explain.several_effects import with_similar
 from rigwatch.workbench.explain.verdict import Verdict, judge, not_converged
 from rigwatch.workbench.explain.verdict_calibration import CLEAR, probability_wrong
 from rigwatch.workbench.fit import Fitted
@@ -66,8 +67,9 @@ def row(
     """An effect with a held-out error, worse than a steady one of it by standard deviations."""
     name, port = label.split("@")
     effect: Any = SimpleNamespace(
-        free=free, family=family, refines=refines, sampled=sampled, time_shift=shift
-    )
+        free=free, family=family, refines=refines, sampled=sampled, time_shift=shift,
+        confused_with=("radiation",),
+    )  # fmt: skip
     found = Ranked(
         Placement(name, effect, port), kind, 0.0, 0.5, {}, list(alike), cosines or {}, {}
     )
@@ -533,3 +535,23 @@ def test_where_training_and_held_out_disagree_nothing_is_named_alone() -> None:
 def _with_training_error(of: Ranked, error: float) -> None:
     assert of.fitted is not None
     of.fitted = replace(of.fitted, train=base(error).train)
+
+
+@pytest.mark.parametrize(
+    ("label", "error", "accepted", "word"),
+    [
+        pytest.param("radiation@x", 1.3, True, "undetermined", id="nearly as good"),
+        pytest.param("radiation@x", 1.6, True, "missing_effect", id="much worse"),
+        pytest.param("radiation@x", 1.3, False, "missing_effect", id="refused"),
+        pytest.param("radiation@y", 1.3, True, "missing_effect", id="elsewhere"),
+        pytest.param("leakage@x", 1.3, True, "missing_effect", id="of another kind"),
+    ],
+)
+def test_what_a_set_bends_into_a_similar_law_is_not_named_alone(
+    label: str, error: float, accepted: bool, word: str
+) -> None:
+    rows = [best("convection@x"), row(label, error, accepted=accepted)]
+    named = Verdict("missing_effect", rows[0], ("convection@x",), (), "convection@x is missing")
+    found = with_similar(named, rows)
+    assert found.word == word
+    assert found.rivals == ((label,) if word == "undetermined" else ())
