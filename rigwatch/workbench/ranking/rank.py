@@ -69,6 +69,9 @@ def rank(
     while spare := _substitute_of_failed(rows):
         progress(f"fitting {spare.label}, as the effect it resembles cannot be fitted")
         refit(study, data, base, spare, fit_model if enough else fit_with_retry)
+    while spare := _substitute_of_vague(rows):
+        progress(f"fitting {spare.label}, as the strength of the effect it resembles is open")
+        refit(study, data, base, spare, fit_model)
     while similar := _unfitted_similar(rows, floor):
         progress(f"fitting {similar.label}, which resembles the best")
         refit(study, data, base, similar, fit_model if enough else fit_with_retry)
@@ -126,6 +129,24 @@ def _substitute_of_failed(rows: Sequence[Ranked]) -> Ranked | None:
     failed = {row.label for row in rows if row.failure}
     waiting = (row for row in rows if row.fitted is None and not row.failure)
     return next((row for row in waiting if row.fitted_instead in failed), None)
+
+
+def _substitute_of_vague(rows: Sequence[Ranked]) -> Ranked | None:
+    """A row skipped for one at its port whose strength the training leaves open; None without one.
+
+    Similar are directions to first order. What a parameter of the model makes up for in one law, as
+    a conductance does in convection, it may not in another.
+    """
+    vague = {row.label for row in rows if row.vague and not row.accepted}
+    waiting = (row for row in rows if row.fitted is None and not row.failure)
+    return next(
+        (
+            r
+            for r in waiting
+            if r.fitted_instead in vague and r.fitted_instead.endswith(f"@{r.port}")
+        ),
+        None,
+    )
 
 
 def _unfitted_similar(rows: Sequence[Ranked], floor: NoiseFloor) -> Ranked | None:

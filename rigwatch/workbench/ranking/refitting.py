@@ -129,7 +129,7 @@ def own_floor(study: Study, data: Data, floor: NoiseFloor, row: Ranked) -> Noise
 def _take(row: Ranked, fitted: Ranked) -> None:
     """Store the fit of a copy of the row in it."""
     row.fitted, row.gain, row.accepted = fitted.fitted, fitted.gain, fitted.accepted
-    row.reason, row.failure = fitted.reason, fitted.failure
+    row.reason, row.failure, row.vague = fitted.reason, fitted.failure, fitted.vague
 
 
 def _is_unlike(row: Ranked, other: Ranked) -> bool:
