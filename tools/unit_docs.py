@@ -12,7 +12,9 @@ HEAD = """<!-- Printed by `make docs` from the table in the code. -->
 Models, effects, studies and imports accept the same units. Internally all values are SI: they are
 converted when a file is read, and `compare`, `explain`, `add`, `report` and `study.toml` give a
 parameter in the unit of its model or effect file (`shown = "mm"` next to `unit` selects another).
-Equations compute in SI. The errors of an output are in its SI unit.
+Equations compute in SI. Texts and tables tell the errors of an output in the unit of its model file
+or, where that has none but SI, in that of the log (`shown = { speed = "rpm" }` in the study); JSON
+and the ledger have them in SI, with the unit named.
 
 * Products by a space, `*` or `·`; quotients by `/`, which applies to the next factor only: `N s/m`,
   `m/(s V)`, `kN/mm`. Powers by `^`, also broken ones: `m/s^2`, `l/(min bar^0.5)`; `m/s2` and `m/s²`

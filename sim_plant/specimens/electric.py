@@ -14,6 +14,8 @@ LINES = np.array([0.7, 1.9, 4.3, 9.1, 14.0])
 """[Hz]."""
 RESISTANCE, INDUCTANCE = 1.2, 0.06
 """[ohm], [H]."""
+BATTERY, INNER = 18.0, 0.5
+"""Supply of a chopper: [V], [ohm]."""
 
 
 def volts(time: FloatArray, seed: int) -> FloatArray:
@@ -44,6 +46,9 @@ def conduct(inputs: FloatArray, dt: float, hidden: str) -> FloatArray:
             copper = 1 + 0.0039 * warmer if hidden == "resistance_by_temperature" else 1.0
             induced = 0.05 * speed if hidden == "back_emf" else 0.0
             brushes = math.copysign(0.6, current) if hidden == "brush_drop" else 0.0
+            if hidden == "supply_sag":
+                share = volt / BATTERY
+                volt = share * (BATTERY - INNER * share * current)
             flux += h * (volt - RESISTANCE * copper * current - brushes - induced)
     return read
 

@@ -93,13 +93,13 @@ EDGE = 2.785293563
 """Rate times step at which a Runge-Kutta step of fourth order neither grows nor decays."""
 
 
-def motor():
-    return compile_system(compose(shipped_models()["motor"]))
+def motor(*placements):
+    return compile_system(compose(shipped_models()["motor"], placements))
 
 
-def discharged(inductance, substeps):
+def discharged(inductance, substeps, *placements):
     """Speed without voltage, from one ampere."""
-    compiled = motor()
+    compiled = motor(*placements)
     return compiled.simulate(
         np.zeros((40, 1)), INTERVAL, np.zeros(1, np.int64), 40, initial=np.array([[0.0, 1.0]]),
         parameters=compiled.vector({"L": inductance, "J": 1e-3, "K": 0.1, "R": 1.0, "b": 1e-4}),
@@ -113,6 +113,17 @@ def test_the_current_decays_where_as_many_steps_as_asked_for_would_keep_it(subst
     assert discharged(edge, substeps) == pytest.approx(
         discharged(edge, 64), abs=1e-3 * discharged(edge, 64).max()
     )
+
+
+@pytest.mark.parametrize(("name", "port"), [("brush_drop", "winding"), ("supply_sag", "drive")])
+def test_an_effect_at_a_fast_mode_leaves_it_as_fast_as_it_is(name, port):
+    effect = library()[name].scaled({"i": 1.0, "u": 1.0, "dt": INTERVAL})
+    faint = replace(effect.parameters[effect.strength], value=1e-9)
+    placement = Placement(
+        name, replace(effect, parameters=effect.parameters | {effect.strength: faint}), port
+    )
+    alone = discharged(INTERVAL / 6, 2)
+    assert discharged(INTERVAL / 6, 2, placement) == pytest.approx(alone, abs=1e-3 * alone.max())
 
 
 def test_a_slow_model_takes_the_steps_asked_for():

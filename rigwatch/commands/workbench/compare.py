@@ -45,9 +45,12 @@ def compared(folder: Path, profiled: bool) -> "Comparison":
 
 
 def _line(found: dict[str, Any]) -> str:
-    errors = ((found[f"{name}_error"], text) for name, text in _ERRORS)
+    from rigwatch.workbench.study import told
+
+    unit = found["told_in"]
+    errors = ((told(found[f"{name}_error"], unit), text) for name, text in _ERRORS)
     said = ", ".join(f"{text} {error:.4g}" for error, text in errors)
-    return f"error {said} {found['unit']}, noise floor {found['noise_floor']:.4g}"
+    return f"error {said} {unit}, noise floor {told(found['noise_floor'], unit):.4g}"
 
 
 def _run_one(arguments: argparse.Namespace, folder: Path) -> int:

@@ -26,7 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
     path = arguments.output or study.folder / "report.html"
     found = write_report(study, path, progress=say)
     last = found.stages[-1].comparison
-    error = f"{last.held_out_error:.4g} {last.unit}"
+    error = f"{last.told(last.held_out_error):.4g} {last.told_in}"
     print_result(
         arguments,
         {"file": path, "verdict": found.explanation.verdict, "comparison": last},

@@ -104,10 +104,10 @@ def _outputs(study: "Study", found: "list[Stage]", shown: "list[Signals]") -> "l
 
 def _story(found: "list[Stage]") -> str:
     rows = [
-        f"| {s.label} | {s.comparison.train_error:.4g} | {s.comparison.held_out_error:.4g} |"
-        for s in found
+        f"| {s.label} | {c.told(c.train_error):.4g} | {c.told(c.held_out_error):.4g} |"
+        for s, c in ((stage, stage.comparison) for stage in found)
     ]
     last = found[-1].comparison
-    head = [f"# Error [{last.unit}]", "", "| step | training | held out |", "|---|---|---|"]
-    floor = f"Noise floor {last.noise_floor:.4g}, from {last.noise_from}."
+    head = [f"# Error [{last.told_in}]", "", "| step | training | held out |", "|---|---|---|"]
+    floor = f"Noise floor {last.told(last.noise_floor):.4g}, from {last.noise_from}."
     return "\n".join([*head, *rows, "", floor, "", "Signals are of the recordings held out."])

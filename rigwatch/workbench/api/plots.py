@@ -81,10 +81,11 @@ def steps(stages: Sequence[Stage]) -> "Figure":
     figure, axes = pyplot.subplots(layout="constrained")
     labels = [stage.label for stage in stages]
     found = [stage.comparison for stage in stages]
-    axes.plot(labels, [c.held_out_error for c in found], "o-", label="held out")
-    axes.plot(labels, [c.train_error for c in found], "s--", label="training")
-    axes.plot(labels, [c.noise_floor for c in found], ":", color="grey", label="noise floor")
-    axes.set_ylabel(f"error [{found[0].unit}]")
+    axes.plot(labels, [c.told(c.held_out_error) for c in found], "o-", label="held out")
+    axes.plot(labels, [c.told(c.train_error) for c in found], "s--", label="training")
+    floors = [c.told(c.noise_floor) for c in found]
+    axes.plot(labels, floors, ":", color="grey", label="noise floor")
+    axes.set_ylabel(f"error [{found[0].told_in}]")
     axes.set_ylim(bottom=0)
     axes.legend()
     return figure

@@ -8,19 +8,33 @@ from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.compare.preparation import Bench, open_bench
 from rigwatch.workbench.compare.uncertainty_budget import added_variances
 from rigwatch.workbench.data import METHODS
-from rigwatch.workbench.fit import Value, as_written, free_run, profile, values
-from rigwatch.workbench.study import Held, Study
+from rigwatch.workbench.fit import (
+    Value,
+    as_written,
+    free_run,
+    profile,
+    values,
+)
+from rigwatch.workbench.study import Held, Study, told, told_unit
 
 
 @dataclass(frozen=True)
 class Channel:
-    """Errors of one output, in its unit; the free run is one simulation of the held-out data."""
+    """Errors of one output, in its SI unit; the free run is one simulation of the held-out data.
+
+    Texts tell them in `told_in`.
+    """
 
     train_error: float
     held_out_error: float
     noise_floor: float
     unit: str
     free_run_error: float | None = None
+    told_in: str = ""
+
+    def told(self, error: float) -> float:
+        """One of the errors in the unit in which it is told."""
+        return told(error, self.told_in)
 
 
 @dataclass(frozen=True)
@@ -29,7 +43,7 @@ class Comparison:
 
     Attributes:
         train_error, held_out_error, noise_floor: over all channels, in `unit`.
-        unit: that of the channel if there is only one, otherwise "× channel noise".
+        unit: that of the channel in SI if there is only one, otherwise "× channel noise".
         noise_from: method of the noise floor, in words.
         channels: by output.
         parameters: by name, in the units of the model's and effects' files.
@@ -37,6 +51,7 @@ class Comparison:
         remarks: notes for the user.
         hold: hold of each input between samples, by name.
         convergence: how the fit of the model ended.
+        told_in: unit in which texts tell the errors.
     """
 
     train_error: float
@@ -50,6 +65,11 @@ class Comparison:
     remarks: list[str]
     hold: dict[str, Held] = field(default_factory=dict)
     convergence: Convergence | None = None
+    told_in: str = ""
+
+    def told(self, error: float) -> float:
+        """An error over all channels in the unit in which it is told."""
+        return told(error, self.told_in)
 
 
 def compare(study: Study, *, profiled: bool = False) -> Comparison:
@@ -72,7 +92,7 @@ def comparison(bench: Bench) -> Comparison:
     base, floor = bench.base, bench.floor
     outputs = bench.study.model.outputs
     channels = {
-        name: Channel(float(a), float(b), float(c), output.unit, free)
+        name: Channel(float(a), float(b), float(c), output.unit, free, told_unit(output))
         for (name, output), a, b, c, free in zip(
             outputs.items(), base.train.rms, base.held_out.rms, floor.rms, _free(bench), strict=True
         )
@@ -93,6 +113,7 @@ def comparison(bench: Bench) -> Comparison:
         [*bench.data.remarks, *weak, *_unchanging(bench)],
         dict(bench.study.holds),
         base.convergence or (bench.study.kept.convergence if bench.study.kept else None),
+        base.told_in,
     )
 
 

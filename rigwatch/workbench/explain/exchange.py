@@ -14,16 +14,18 @@ from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench, bench_of, prepared, with_horizon_of
 from rigwatch.workbench.fit import held_as
 from rigwatch.workbench.ranking import (
+    MATERIAL,
+    STEP,
     Progress,
     Ranked,
     difference,
     rank_only,
-    refit_all,
+    refit_nested,
     shapes_of,
 )
-from rigwatch.workbench.study import Study, drop_effect
+from rigwatch.workbench.study import Study, drop_effect, told
 
-MOST_TRIED = 8
+MOST_TRIED = 10
 """Largest number of effects of a kind that are fitted in place of one."""
 MUCH = 0.25
 """Share of the squared error that it must explain: where nothing else explains what is left, other
@@ -39,7 +41,7 @@ class Exchange:
     Attributes:
         effect, port: the effect that fits better.
         instead_of: the accepted effect at that port.
-        held_out_error: with the exchange, in the unit of the study's errors.
+        held_out_error: with the exchange, in the SI unit of the study's errors.
         p_value: one-sided, of so large a fall of the held-out error by chance; corrected for the
             number of effects tried.
     """
@@ -54,7 +56,7 @@ class Exchange:
         """The offer in words, with the commands that take it in the study's folder."""
         return (
             f"{self.effect}@{self.port} in place of {self.instead_of}@{self.port} lowers"
-            f" the held-out error to {self.held_out_error:.3g} {unit}"
+            f" the held-out error to {told(self.held_out_error, unit):.3g} {unit}"
             f" (rigwatch undo {study}, then rigwatch add {study} {self.effect} --port {self.port})"
         )
 
@@ -75,21 +77,52 @@ def exchange(bench: Bench, progress: Progress) -> Exchange | None:
         rows = _fitted(_without_last(bench), names, last.port)
     except ModelError:
         return None  # the model cannot be fitted without it
-    found = [_in_place(bench, row, last.effect, len(names)) for row in rows if row.accepted]
-    better = [each for each in found if each is not None]
-    return min(better, key=lambda each: each.held_out_error, default=None)
+    found = [(_in_place(bench, row, last.effect, len(names)), row) for row in rows if row.accepted]
+    better = {row.label: each for each, row in found if each is not None}
+    named = _simplest([row for row in rows if row.label in better])
+    return better[named.label] if named else None
+
+
+def _simplest(rows: Sequence[Ranked]) -> Ranked | None:
+    """The simplest that no other betters by more than chance and a material amount."""
+    return min(
+        (row for row in rows if not any(_is_better(other, row) for other in rows)),
+        key=lambda row: (row.free, row.held_out_error),
+        default=None,
+    )
+
+
+def _is_better(one: Ranked, other: Ranked) -> bool:
+    assert one.fitted is not None
+    assert other.fitted is not None
+    fall = difference(other.fitted.held_out, one.fitted.held_out)
+    return fall.p_falls < STEP and fall.relative > MATERIAL
 
 
 def of_a_kind(study: Study, effect: str, port: str) -> list[str]:
-    """Effects that the library calls similar to one, elective or not, which suit its port."""
+    """Effects that the library calls similar to one, elective or not, which suit its port.
+
+    Those that describe it in more detail come first; those that it describes in more detail are
+    contained in it, and cannot do better.
+    """
     placed = {accepted.effect for accepted in study.file.effects if accepted.port == port}
+    placed.update(_coarser(study, effect))
     one, place = study.effect(effect), study.model.ports[port]
-    return [
+    found = [
         name
         for name, other in study.effects.items()
         if name not in placed and _is_related(effect, one, name, other)
         if suits(other, place, study.model)
     ]
+    return sorted(found, key=lambda name: effect not in _coarser(study, name))
+
+
+def _coarser(study: Study, effect: str) -> list[str]:
+    """What an effect refines, what that refines, and so on."""
+    found: list[str] = []
+    while (effect := study.effect(effect).refines) in study.effects and effect not in found:
+        found.append(effect)
+    return found
 
 
 def _is_related(name: str, one: Effect, other_name: str, other: Effect) -> bool:
@@ -107,7 +140,7 @@ def _fitted(bench: Bench, names: Sequence[str], port: str) -> list[Ranked]:
     study, data, base = bench.study, bench.data, bench.base
     shapes = [shapes_of(study, data.train, name, port) for name in names]
     rows = [rank_only(study, data, base, found) for found in shapes if found]
-    refit_all(study, data, base, rows)
+    refit_nested(study, data, base, rows)
     return rows
 
 

@@ -104,7 +104,8 @@ class Explanation:
         like_this: number of simulated cases with a similar verdict, and how many were wrong.
         beside: the other effects of the set that the named effect was judged in; with them `add`
             accepts it if it is refused alone.
-        error_unit: unit of the errors in `text` and `ranking`.
+        error_unit: SI unit of the errors in `ranking`; `text` tells them in that of the
+            comparison's `told_in`.
         wrong_at_most: upper bound of that probability, 95 %; None as above.
         unlike: why no simulated case is like this one, in words; empty if some are.
         exchange: an effect that describes the last accepted one better, if nothing beside it
@@ -179,7 +180,7 @@ def _with_exchange(bench: Bench, found: Explanation, progress: Progress) -> Expl
     offer = exchange(bench, progress)
     if offer is None:
         return found
-    told = offer.text(found.error_unit, str(bench.study.folder))
+    told = offer.text(bench.base.told_in, str(bench.study.folder))
     return replace(found, text=f"{found.text}; but {told}", exchange=offer)
 
 

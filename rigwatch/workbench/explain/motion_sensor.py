@@ -186,7 +186,7 @@ def _named(bench: Bench, best: Ranked, rows: list[Ranked]) -> Verdict:
     assert best.fitted is not None
     text = (
         f"{best.label} is missing ({name} = {value:.4g} in SI units): the held-out error falls from"
-        f" {bench.base.held_out_error:.3g} to {best.held_out_error:.3g} {bench.base.error_unit}"
+        f" {bench.base.told_error:.3g} to {best.fitted.told_error:.3g} {bench.base.told_in}"
     )
     left = bench.floor.left_over(bench.base.held_out, best.fitted.held_out)
     word: Word = "undetermined" if alike else "missing_effect"

@@ -61,6 +61,6 @@ def other_accepted(rows: Sequence[Ranked], named: Sequence[str]) -> str:
     """The best accepted effects that are not named, in words; empty if there are none."""
     others = [row for row in rows if row.accepted and row.label not in named]
     best = sorted(others, key=lambda row: row.held_out_error)[:MENTIONED]
-    listed = ", ".join(f"{row.label} ({row.held_out_error:.3g})" for row in best)
+    listed = ", ".join(f"{row.label} ({row.fitted.told_error:.3g})" for row in best if row.fitted)
     more = f" and {len(others) - len(best)} more" if len(others) > len(best) else ""
     return f"; also accepted: {listed}{more}" if listed else ""

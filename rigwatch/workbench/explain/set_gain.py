@@ -13,6 +13,7 @@ from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.explain.combinations import with_rows
 from rigwatch.workbench.fit import Fitted
 from rigwatch.workbench.ranking import Ranked, judge_fit, rank_only, refit, shapes_of
+from rigwatch.workbench.study import told
 
 
 @dataclass(frozen=True)
@@ -32,10 +33,9 @@ class SetGain:
     held_out_error: float
     reason: str
 
-    @property
-    def text(self) -> str:
-        """The evidence in a sentence."""
-        errors = f"{self.without:.4g} → {self.held_out_error:.4g}"
+    def text(self, unit: str) -> str:
+        """The evidence in a sentence, in the unit in which errors are told."""
+        errors = f"{told(self.without, unit):.4g} → {told(self.held_out_error, unit):.4g} {unit}"
         return f"with {', '.join(self.others)}: held-out error {errors}"
 
 

@@ -50,6 +50,7 @@ class _Member:
 
     row: Ranked
     verdict: Verdict
+    ranked: Sequence[Ranked] = ()
 
     @property
     def named(self) -> frozenset[str]:
@@ -93,6 +94,32 @@ def several_effects(
     )
 
 
+def with_similar(verdict: Verdict, rows: Sequence[Ranked]) -> Verdict:
+    """The verdict on an effect of a set that is refused alone, undetermined beside similar ones.
+
+    The others of the set can bend one law into another, as a sensor's curvature makes convection of
+    radiation, and alone the recording does not support it. Similar are effects at its port that the
+    library calls so and that are nearly as good.
+
+    Args:
+        verdict: names the effect with confidence.
+        rows: the ranking that it is of, in the model with the others of the set.
+    """
+    best = verdict.best
+    assert best is not None
+    similar = tuple(
+        row.label
+        for row in rows
+        if row.accepted and row.label not in verdict.members and row.port == best.port
+        if row.effect in best.placement.effect.confused_with
+        if row.held_out_error < MUCH_WORSE * best.held_out_error
+    )
+    if not similar:
+        return verdict
+    text = f"{best.label} and {', '.join(similar)} explain it nearly equally well"
+    return replace(verdict, word="undetermined", rivals=similar, text=text)
+
+
 def may_need_several(bench: Bench, verdict: Verdict) -> bool:
     """Whether more than one effect may be missing.
 
@@ -124,7 +151,7 @@ def _with_best_set(verdict: Verdict, best: Combination, every: Sequence[Combinat
     if verdict.word not in UNNAMED or len(best.rows) == 1:
         return verdict
     text = f"{verdict.text}; {_joined(best.labels)} together leave"
-    text += f" {best.fitted.held_out_error:.3g} {best.fitted.error_unit}"
+    text += f" {best.fitted.told_error:.3g} {best.fitted.told_in}"
     equals = [each.labels for each in every if not_worse(each, best)]
     common = frozenset.intersection(*equals)
     if common and common != best.labels:
@@ -196,13 +223,14 @@ def _judge_each(
     for row, rest in rests:
         progress(f"judging {row.label} together with {_joined(rest.labels)}")
         floor = floor_of(bench, best.fitted)
-        found = judge(rest.fitted, _ranked_with(bench, rest, row, floor), floor)
+        ranking = _ranked_with(bench, rest, row, floor)
+        found = judge(rest.fitted, ranking, floor)
         other = found.best
         if other is not None and other.label != row.label:
             better = Combination((*rest.rows, other))
             if better.fitted.held_out_error < best.fitted.held_out_error:
                 return better, []
-        parts.append(_Member(row, found))
+        parts.append(_Member(row, found, ranking))
     return None, parts
 
 
@@ -246,6 +274,8 @@ def _set_verdict(
     row = alone[first.row.label]
     if row.fitted is None:
         refit(bench.study, bench.data, bench.base, row)
+    if not row.accepted and first.certain:
+        first = replace(first, verdict=with_similar(first.verdict, first.ranked))
     found, second = first.verdict, then[0].verdict.members if first.certain and then else ()
     left = floor_of(bench, best.fitted).left_over(bench.base.held_out, best.fitted.held_out)
     others = tuple(each.label for each in best.rows if each.label != row.label)

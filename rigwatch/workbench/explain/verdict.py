@@ -195,9 +195,10 @@ def _word(
         return "undetermined", (
             f"{best.label} and {', '.join(rivals)} explain this recording equally well"
         )
+    assert best.fitted is not None
     return "missing_effect", (
-        f"{best.label} is missing: the held-out error falls from {base.held_out_error:.3g} to"
-        f" {best.held_out_error:.3g} {base.error_unit}"
+        f"{best.label} is missing: the held-out error falls from {base.told_error:.3g} to"
+        f" {best.fitted.told_error:.3g} {base.told_in}"
     )
 
 
@@ -365,7 +366,24 @@ def _named(base: Fitted, accepted: Sequence[Ranked], floor: NoiseFloor) -> Ranke
         if row.effect == lower and row.gain and best.gain and row.gain > MOST_OF_IT * best.gain:
             alone = explains(base, best, floor) and not explains(base, row, floor)
             return best if alone else row
-    return best
+    return best if explains(base, best, floor) else _simpler_of_all(best, accepted)
+
+
+def _simpler_of_all(best: Ranked, accepted: Sequence[Ranked]) -> Ranked:
+    """The simpler effect of the best's family that leaves less of all recordings; or the best.
+
+    A further parameter that pays on the few recordings held out alone follows what is missing
+    beside it there, as friction that falls with speed does where a supply sags.
+    """
+    assert best.fitted is not None
+    least = _energy(best.fitted)
+    simpler = [
+        row
+        for row in accepted
+        if row.free < best.free and _same_family(best, row) and row.fitted is not None
+        if _energy(row.fitted) < least
+    ]
+    return min(simpler, key=lambda row: (row.free, row.held_out_error), default=best)
 
 
 def _simplest(row: Ranked) -> tuple[int, bool, float]:

@@ -13,6 +13,7 @@ from rigwatch.physics.engine.search import (
     Convergence,
 )
 from rigwatch.wire.arrays import BoolArray, FloatArray
+from rigwatch.workbench.study import NOISES, told, told_unit
 
 DIVERGED = 1e6
 """Ratio of an error to that without the effect beyond which the simulation has diverged."""
@@ -65,7 +66,18 @@ class Fitted:
     def error_unit(self) -> str:
         """Unit of the overall errors: that of the channel if there is only one."""
         outputs = list(self.compiled.system.model.outputs.values())
-        return outputs[0].unit if len(outputs) == 1 else "× channel noise"
+        return outputs[0].unit if len(outputs) == 1 else NOISES
+
+    @property
+    def told_in(self) -> str:
+        """Unit in which texts tell the overall errors."""
+        outputs = list(self.compiled.system.model.outputs.values())
+        return told_unit(outputs[0]) if len(outputs) == 1 else NOISES
+
+    @property
+    def told_error(self) -> float:
+        """The held-out error in the unit in which it is told."""
+        return told(self.held_out_error, self.told_in)
 
 
 def overall(fitted: Fit) -> float:

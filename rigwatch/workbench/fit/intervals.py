@@ -30,6 +30,9 @@ ENOUGH = 12
 """Number of windows above which each is a block of its own."""
 BLOCK_LENGTH, FEWEST = 2.0, 8
 """Length of a block over the correlation time, and number of blocks that must be left."""
+FARTHEST = 1e70
+"""Largest change of a parameter; one that hardly moves the model has no larger, and the squares of
+variances stay finite."""
 PHASES = 20
 """Number of parts of one repetition, each a block."""
 TOLD = "told by the first samples of a held-out recording"
@@ -92,7 +95,7 @@ def covariance(fitted: Fit, repeat: int = 0) -> tuple[FloatArray, FloatArray]:
     normal = whole.T @ whole
     rest = np.array([np.linalg.pinv(normal - each, rcond=1e-12) for each in own])
     slopes = np.array([whole[rows].T @ error[rows] for rows in parts])
-    moved = np.einsum("bij,bj->bi", rest, slopes) / size
+    moved = np.clip(np.einsum("bij,bj->bi", rest, slopes) / size, -FARTHEST, FARTHEST)
     spread = moved.T @ moved * ((len(parts) - 1) / len(parts))
     return np.asarray(spread), _degrees_of_freedom(normal, own, rest)
 

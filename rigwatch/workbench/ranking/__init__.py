@@ -8,6 +8,7 @@ are fitted (`refitting`) and judged by the held-out error (`acceptance`). `rank`
 from rigwatch.workbench.ranking.acceptance import EXPLAINED, MATERIAL, STEP, judge_fit, left_over
 from rigwatch.workbench.ranking.candidates import candidates, shapes_of
 from rigwatch.workbench.ranking.fit_selection import select_for_fit
+from rigwatch.workbench.ranking.nested_start import refit_nested
 from rigwatch.workbench.ranking.paired_test import difference
 from rigwatch.workbench.ranking.rank import AGAIN, MUCH_WORSE, rank
 from rigwatch.workbench.ranking.ranked import SAME, SIMILAR, Ranked, accepted_from, in_order
@@ -17,7 +18,6 @@ from rigwatch.workbench.ranking.refitting import (
     no_progress,
     own_floor,
     refit,
-    refit_all,
 )
 from rigwatch.workbench.ranking.same_drive import denied_sensors
 from rigwatch.workbench.ranking.scoring import rank_all, rank_only, score_all, scored
@@ -45,7 +45,7 @@ __all__ = [
     "rank_all",
     "rank_only",
     "refit",
-    "refit_all",
+    "refit_nested",
     "score_all",
     "scored",
     "select_for_fit",

@@ -38,7 +38,7 @@ def judge_fit(base: Fitted, row: Ranked) -> None:
     if row.fitted.train_error > (1 + MATERIAL) * base.train_error:
         row.reason = "its fit ended in a local minimum: the training error rises"
     if not row.reason and (vague := _undetermined_strength(row)) is not None:
-        row.reason = vague
+        row.reason, row.vague = vague, True
     row.accepted = not row.reason
     row.reason = row.reason or "held-out error falls"
 

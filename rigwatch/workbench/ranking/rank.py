@@ -7,7 +7,6 @@ full. An effect is accepted only if the held-out error falls, over blocks, by mo
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from rigwatch.workbench.data import Data, NoiseFloor
 from rigwatch.workbench.fit import Fitted, fit_model, fit_with_retry
@@ -15,9 +14,9 @@ from rigwatch.workbench.ranking.candidates import candidates
 from rigwatch.workbench.ranking.fit_selection import LEVEL, select_for_fit
 from rigwatch.workbench.ranking.ranked import SAME, Ranked, in_order
 from rigwatch.workbench.ranking.refitting import (
-    Fitting,
     Progress,
     fit_each,
+    fit_from,
     no_progress,
     own_floor,
     refit,
@@ -70,28 +69,19 @@ def rank(
     while spare := _substitute_of_failed(rows):
         progress(f"fitting {spare.label}, as the effect it resembles cannot be fitted")
         refit(study, data, base, spare, fit_model if enough else fit_with_retry)
+    while spare := _substitute_of_vague(rows):
+        progress(f"fitting {spare.label}, as the strength of the effect it resembles is open")
+        refit(study, data, base, spare, fit_model)
     while similar := _unfitted_similar(rows, floor):
         progress(f"fitting {similar.label}, which resembles the best")
         refit(study, data, base, similar, fit_model if enough else fit_with_retry)
     for other in _elsewhere(study, data, rows, floor):
         progress(f"fitting {other.label}, as the best may act there")
-        refit(study, data, base, other, _from(in_order(rows)[0].fitted))
+        refit(study, data, base, other, fit_from(in_order(rows)[0].fitted))
     for other in _simpler_or_equal(study, data, rows, floor):
         progress(f"fitting {other.label}, as the best at its port leaves more than noise")
         refit(study, data, base, other, fit_model)
     return in_order(rows)
-
-
-def _from(found: Fitted | None) -> Fitting:
-    """`fit_model` that starts from the model's parameters in another fit."""
-    own = found.train.values() if found else {}
-
-    def fitting(study: Study, *args: Any, **more: Any) -> Fitted:
-        data, placements, start, scale = args
-        known = {name: own[name] for name in study.model.parameters if name in own}
-        return fit_model(study, data, placements, {**start, **known}, scale, **more)
-
-    return fitting
 
 
 def _elsewhere(study: Study, data: Data, rows: Sequence[Ranked], floor: NoiseFloor) -> list[Ranked]:
@@ -139,6 +129,24 @@ def _substitute_of_failed(rows: Sequence[Ranked]) -> Ranked | None:
     failed = {row.label for row in rows if row.failure}
     waiting = (row for row in rows if row.fitted is None and not row.failure)
     return next((row for row in waiting if row.fitted_instead in failed), None)
+
+
+def _substitute_of_vague(rows: Sequence[Ranked]) -> Ranked | None:
+    """A row skipped for one at its port whose strength the training leaves open; None without one.
+
+    Similar are directions to first order. What a parameter of the model makes up for in one law, as
+    a conductance does in convection, it may not in another.
+    """
+    vague = {row.label for row in rows if row.vague and not row.accepted}
+    waiting = (row for row in rows if row.fitted is None and not row.failure)
+    return next(
+        (
+            r
+            for r in waiting
+            if r.fitted_instead in vague and r.fitted_instead.endswith(f"@{r.port}")
+        ),
+        None,
+    )
 
 
 def _unfitted_similar(rows: Sequence[Ranked], floor: NoiseFloor) -> Ranked | None:

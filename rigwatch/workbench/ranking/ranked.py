@@ -37,6 +37,7 @@ class Ranked:
         reason: why it is accepted, refused or not fitted, in words.
         failure: why its fit failed, or why it cannot be what is missing; empty otherwise.
         fitted_instead: label of the similar effect fitted in its place; empty if there is none.
+        vague: whether it is refused as the training does not determine its strength.
     """
 
     placement: Placement
@@ -53,6 +54,7 @@ class Ranked:
     reason: str = "not like the residual"
     failure: str = ""
     fitted_instead: str = ""
+    vague: bool = False
     p_alone: float = 1.0
 
     @property

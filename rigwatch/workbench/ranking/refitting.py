@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 from rigwatch.physics.engine.compile import cores, side_by_side
 from rigwatch.physics.engine.equations import Placement
@@ -48,6 +49,18 @@ def refit(
         return
     row.fitted = min(fits, key=lambda fitted: fitted.train_error)
     judge_fit(base, row)
+
+
+def fit_from(found: Fitted | None) -> Fitting:
+    """`fit_model` that starts from the model's parameters in another fit."""
+    own = found.train.values() if found else {}
+
+    def fitting(study: Study, *args: Any, **more: Any) -> Fitted:
+        data, placements, start, scale = args
+        known = {name: own[name] for name in study.model.parameters if name in own}
+        return fit_model(study, data, placements, {**start, **known}, scale, **more)
+
+    return fitting
 
 
 def _orders_at_port(base: Fitted, row: Ranked) -> list[Placement]:
@@ -116,7 +129,7 @@ def own_floor(study: Study, data: Data, floor: NoiseFloor, row: Ranked) -> Noise
 def _take(row: Ranked, fitted: Ranked) -> None:
     """Store the fit of a copy of the row in it."""
     row.fitted, row.gain, row.accepted = fitted.fitted, fitted.gain, fitted.accepted
-    row.reason, row.failure = fitted.reason, fitted.failure
+    row.reason, row.failure, row.vague = fitted.reason, fitted.failure, fitted.vague
 
 
 def _is_unlike(row: Ranked, other: Ranked) -> bool:

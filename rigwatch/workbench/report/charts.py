@@ -37,15 +37,15 @@ def error_chart(stages: Sequence[Stage], refused: Sequence[Refused]) -> str:
     """Errors of every stage against the noise floor."""
     at = np.arange(len(stages), dtype=float)
     found = [stage.comparison for stage in stages]
-    train = np.array([c.train_error for c in found])
-    held_out = np.array([c.held_out_error for c in found])
-    floor = np.array([c.noise_floor for c in found])
-    tried = np.array([r.held_out_error for r in refused])
+    train = np.array([c.told(c.train_error) for c in found])
+    held_out = np.array([c.told(c.held_out_error) for c in found])
+    floor = np.array([c.told(c.noise_floor) for c in found])
+    tried = np.array([found[0].told(r.held_out_error) for r in refused])
     ends = limits(train, held_out, floor, tried, zero=True)
     right = max(len(stages) - 0.5, 0.6)
     plot = Plot(
         "Error of each step against the noise floor", (-0.5, right), ends, "",
-        f"error [{found[0].unit}]", 760, 320, names=[s.label for s in stages],
+        f"error [{found[0].told_in}]", 760, 320, names=[s.label for s in stages],
     )  # fmt: skip
     for k, level in enumerate(floor.tolist()):
         plot.box((k - 0.5, k + 0.5), (0.0, level), "floor", f"noise floor {level:.4g}", 0.25)
@@ -53,11 +53,11 @@ def error_chart(stages: Sequence[Stage], refused: Sequence[Refused]) -> str:
     plot.text(-0.46, float(floor[0]), "noise floor", up=6)
     plot.line(at, train, "train", width=2, dash="6 5", marks=True, name="training")
     plot.line(at, held_out, "held", width=3, marks=True, name="held out")
-    for k, c in enumerate(found):
-        plot.text(k + 0.06, c.held_out_error, f"{c.held_out_error:.3g}", "held", up=9)
+    for k, error in enumerate(held_out.tolist()):
+        plot.text(k + 0.06, error, f"{error:.3g}", "held", up=9)
     for place, entry in _positions(refused):
-        told = f"{entry.label} refused: {entry.held_out_error:.4g}"
-        plot.mark(place, entry.held_out_error, "refused", told, hollow=True)
+        error = found[0].told(entry.held_out_error)
+        plot.mark(place, error, "refused", f"{entry.label} refused: {error:.4g}", hollow=True)
     return plot.drawn()
 
 

@@ -73,7 +73,8 @@ def headline(m: Material) -> str:
         words = m.explanation.text
     if len(m.stages) == 1:
         return words[0].upper() + words[1:]
-    fall = f"Error {first.held_out_error:.3g} → {last.held_out_error:.3g} {last.unit}"
+    fall = f"Error {first.told(first.held_out_error):.3g} → {last.told(last.held_out_error):.3g}"
+    fall += f" {last.told_in}"
     still = words.replace("probably", "probably still", 1)
     return f"{fall} on unseen data; {still}"
 
@@ -100,8 +101,8 @@ def story(m: Material) -> str:
     if len(m.stages) == 1:
         return verdict
     return (
-        f"The error on held-out recordings fell from {first.held_out_error:.3g} to"
-        f" {last.held_out_error:.3g} {last.unit} as {_listed(m)} was added. {verdict}"
+        f"The error on held-out recordings fell from {first.told(first.held_out_error):.3g} to"
+        f" {last.told(last.held_out_error):.3g} {last.told_in} as {_listed(m)} was added. {verdict}"
     )
 
 

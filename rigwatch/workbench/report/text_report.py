@@ -45,16 +45,21 @@ def comparison_lines(found: Comparison) -> list[str]:
     """What `rigwatch compare` prints."""
     heading = "effects: " + (", ".join(found.effects) or "none yet")
     rows = [
-        [name, c.unit, number(c.train_error), number(c.held_out_error), number(c.noise_floor)]
+        [
+            name,
+            c.told_in,
+            *(number(c.told(e)) for e in (c.train_error, c.held_out_error, c.noise_floor)),
+        ]
         for name, c in found.channels.items()
     ]
     if len(rows) > 1:
         total = (found.train_error, found.held_out_error, found.noise_floor)
-        rows.append(["all", found.unit, *map(number, total)])
+        rows.append(["all", found.told_in, *map(number, total)])
     lines = [heading, "", "error (root mean square)"]
     lines += table(["channel", "unit", "training", "held out", "noise floor"], rows)
     lines += [
-        f"  one free run over all held-out data: {name} {number(c.free_run_error)} {c.unit}"
+        f"  one free run over all held-out data: {name} {number(c.told(c.free_run_error))}"
+        f" {c.told_in}"
         for name, c in found.channels.items()
         if c.free_run_error is not None
     ]
@@ -112,14 +117,15 @@ def explanation_lines(found: Explanation, most: int = 12) -> list[str]:
         f"  {doubt_of(found)}",
         *_named_lines(found),
         "",
-        f"now: training {base.train_error:.4g}, held out {base.held_out_error:.4g},"
-        f" noise floor {base.noise_floor:.4g} {base.unit}",
+        f"now: training {base.told(base.train_error):.4g},"
+        f" held out {base.told(base.held_out_error):.4g},"
+        f" noise floor {base.told(base.noise_floor):.4g} {base.told_in}",
         f"  noise floor from {base.noise_from}",
         *fit_lines(base),
         "",
         f"ranking ({len(found.ranking)} effects at ports)",
     ]
-    errors = [f"training [{found.error_unit}]", "held out", "p", "", "cannot be told from"]
+    errors = [f"training [{base.told_in}]", "held out", "p", "", "cannot be told from"]
     lines += table(["effect@port", *errors], [_ranked(row, base) for row in found.ranking[:most]])
     if found.next_experiment:
         lines += ["", f"next experiment: {found.next_experiment.text}"]
@@ -171,30 +177,38 @@ def _ranked(row: Row, base: Comparison) -> list[str]:
     mark = "accepted" if row.accepted else row.reason
     p = "< 1e-6" if row.p_value < 1e-6 else f"{row.p_value:.1g}"
     errors = [
-        error_text(row.train_error, base.train_error),
-        error_text(row.held_out_error, base.held_out_error),
+        _error(row.train_error, base.train_error, base),
+        _error(row.held_out_error, base.held_out_error, base),
     ]
     return [f"{row.effect}@{row.port}", *errors, p, mark, ", ".join(row.class_[:3])]
 
 
+def _error(error: float | None, known: float, where: Comparison) -> str:
+    """An error in the unit in which it is told; "diverges" if it is far beyond the known one."""
+    return error_text(None if error is None else where.told(error), where.told(known))
+
+
 def change_lines(found: Change) -> list[str]:
     """What `rigwatch add` and `undo` print."""
-    rows = [["before", number(found.before.train_error), number(found.before.held_out_error)]]
+    rows = [["before", *_errors(found.before)]]
     if found.tried and found.step == "refused":
         known = (found.before.train_error, found.before.held_out_error)
-        tried = [error_text(*each) for each in zip(found.tried, known, strict=True)]
+        tried = [_error(*each, found.before) for each in zip(found.tried, known, strict=True)]
         rows.append([f"with {found.effect}", *tried])
     else:
-        after = found.after
-        rows.append(["after", number(after.train_error), number(after.held_out_error)])
+        rows.append(["after", *_errors(found.after)])
     lines = [found.text, ""]
-    lines += table([f"error [{found.after.unit}]", "training", "held out"], rows)
+    lines += table([f"error [{found.after.told_in}]", "training", "held out"], rows)
     if found.step != "refused":
         lines += ["", "parameters, 95 % interval"]
         lines += table(
             ["name", "value", "interval", "unit", ""], _parameters(found.after.parameters)
         )
     return lines
+
+
+def _errors(found: Comparison) -> list[str]:
+    return [number(found.told(error)) for error in (found.train_error, found.held_out_error)]
 
 
 def base_lines(found: Bases, most: int = 12) -> list[str]:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from rigwatch.physics.engine.equations import Input, Model, Output, model_named
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.units import is_unit, unit_of
 from rigwatch.workbench.data import (
     RATES_ALIKE,
     UNFILLED,
@@ -77,6 +78,9 @@ def _file(files: NewFiles, logs: Logs, model: Model, reading: Matched) -> tuple[
         lines.append(f"rate = {min(rates):.6g}  # the slowest log's")
     if logs.start:
         lines.append(f"start = {_inline(logs.start)}")
+    if units := _of_log(model, reading.channels):
+        written = ", ".join(f'{name} = "{unit}"' for name, unit in units.items())
+        lines.append(f"shown = {{ {written} }}  # the logs' units")
     if reading.rates:
         sources = sorted({channel for channel, _ in reading.rates.values()})
         low_pass = max(proposed_low_pass(tables, name) for name in sources)
@@ -108,6 +112,16 @@ def _file(files: NewFiles, logs: Logs, model: Model, reading: Matched) -> tuple[
             f" --set {known[0]}=VALUE"
         )
     return "\n".join(lines) + "\n", choices
+
+
+def _of_log(model: Model, columns: Mapping[str, str]) -> dict[str, str]:
+    """Units of the logs' columns, by output, where the model's file has the SI unit alone."""
+    found = {}
+    for name, output in model.outputs.items():
+        text = columns.get(output.channel or name, "").rpartition("[")[2].rstrip(" ]")
+        if is_unit(text) and not output.shown and not unit_of(text).plain:
+            found[name] = text
+    return found
 
 
 def _as_read(columns: Mapping[str, str]) -> str:

@@ -25,7 +25,7 @@ from rigwatch.workbench.ranking import (
     accepted_from,
     no_progress,
     rank_only,
-    refit,
+    refit_nested,
     shapes_of,
 )
 from rigwatch.workbench.study import (
@@ -137,13 +137,13 @@ def try_add(
     after = warm.comparison(changed)
     again = after.held_out_error
     if supported and not keeps_gain(before.held_out_error, found, again, after.noise_floor):
-        supported, row = False, replace(row, reason=f"refitted, it leaves {again:.4g} {after.unit}")
+        supported, row = False, replace(row, reason=f"refitted, it leaves {_told(again, after)}")
         if not anyway:
             return _refused(study, row, before, f"{_falls(row, before, found)}, but {row.reason}")
     line = {"parameters": accepted.parameters, "model_parameters": accepted.model}
     line |= _evidence(in_set) | ({} if supported else {"reason": f"added anyway: {row.reason}"})
     errors, text = (after.train_error, again), _falls(row, before, again)
-    text = f"{text}; {in_set.text} {before.unit}" if in_set is not None else text
+    text = f"{text}; {in_set.text(before.told_in)}" if in_set is not None else text
     change = Change("add", effect, where, before, after, errors, text)
     return Trial(study, changed, change, _which(change) | line | _numbers(after))
 
@@ -178,8 +178,13 @@ def _evidence(found: SetGain | None) -> dict[str, Any]:
 
 
 def _falls(row: Ranked, before: Comparison, after: float) -> str:
-    error = error_text(after, before.held_out_error)
-    return f"{row.label}: held-out error {before.held_out_error:.4g} → {error} {before.unit}"
+    at_first, then = before.told(before.held_out_error), before.told(after)
+    error = f"{error_text(then, at_first)} {before.told_in}"
+    return f"{row.label}: held-out error {at_first:.4g} → {error}"
+
+
+def _told(error: float, where: Comparison) -> str:
+    return f"{where.told(error):.4g} {where.told_in}"
 
 
 def keeps_gain(before: float, accepted: float, again: float, floor: float) -> bool:
@@ -227,7 +232,7 @@ def _without(
     before = warm.comparison(study)
     progress(f"fitting without {label}")
     found = warm.comparison(after)
-    errors = f"{before.held_out_error:.4g} → {found.held_out_error:.4g} {found.unit}"
+    errors = f"{before.told(before.held_out_error):.4g} → {_told(found.held_out_error, found)}"
     text = f"{label} removed: held-out error {errors}"
     return Change("undo", *what, before, found, None, text)
 
@@ -305,7 +310,7 @@ def _port(study: Study, name: str, port: str | None) -> str:
 def _tried(bench: Bench, effect: str, port: str) -> Ranked:
     found = shapes_of(bench.study, bench.data.train, effect, port)
     row = rank_only(bench.study, bench.data, bench.base, found)
-    refit(bench.study, bench.data, bench.base, row)
+    refit_nested(bench.study, bench.data, bench.base, [row])
     if row.fitted is None:
         raise ModelError(f"{row.label}: cannot be fitted: {row.failure}")
     return row

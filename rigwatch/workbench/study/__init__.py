@@ -26,11 +26,13 @@ from rigwatch.workbench.study.study import (
     varied,
 )
 from rigwatch.workbench.study.study_file import Accepted, Derive, Derived, Span, StudyFile
+from rigwatch.workbench.study.told_units import NOISES, told, told_unit
 
 __all__ = [
     "FILE",
     "GIVEN",
     "LEDGER",
+    "NOISES",
     "Accepted",
     "Derive",
     "Derived",
@@ -60,6 +62,8 @@ __all__ = [
     "stands_on",
     "start_study",
     "study_of",
+    "told",
+    "told_unit",
     "use_effect_file",
     "use_model_file",
     "use_variants",

@@ -47,6 +47,7 @@ from rigwatch.workbench.study.recording_parameters import (
     known_of,
 )
 from rigwatch.workbench.study.study_file import Accepted, StudyFile
+from rigwatch.workbench.study.told_units import with_shown_units
 
 GIVEN = ("the study", "the model file")
 """Sources of holds that were given rather than chosen from data."""
@@ -207,7 +208,7 @@ def study_of(folder: Path, text: str, unsaved: Mapping[str, Unsaved] = NOTHING_U
     written = _written(folder, file, own_files)
     in_si = known_in_si(written, file, folder / FILE)
     known, file = known_of(written, file), told_apart(written, in_si)
-    model, holds = _held(_by_recording(written, file), file)
+    model, holds = _held(with_shown_units(_by_recording(written, file), file), file)
     study = Study(
         folder,
         file,
@@ -306,7 +307,7 @@ def varied(study: Study, variants: Sequence[str]) -> Study:
     for element in study.elements:
         if f"{element.name}@{element.port}" in named:
             written = with_element(written, element)
-    model, holds = _held(_by_recording(written, file), file)
+    model, holds = _held(with_shown_units(_by_recording(written, file), file), file)
     model = with_known_values(model, file)
     return replace(study, file=file, model=model, kept=None, holds=holds)
 

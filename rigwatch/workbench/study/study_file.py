@@ -104,6 +104,12 @@ class StudyFile(Section, frozen=True, kw_only=True):
     channels: Annotated[
         dict[str, str], Meta(description="channel of a model's signal, if its name differs")
     ] = field(default_factory=dict)
+    shown: Annotated[
+        dict[str, str],
+        Meta(
+            description="unit in which an output's errors are told, the model file's if not given"
+        ),
+    ] = field(default_factory=dict)
     start: Annotated[
         dict[str, float],
         Meta(

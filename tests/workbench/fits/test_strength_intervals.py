@@ -215,3 +215,12 @@ def holds(value: Value, truth: float) -> bool:
 def half_width(value: Value) -> float:
     assert value.interval is not None
     return (value.interval[1] - value.interval[0]) / 2 / value.value
+
+
+def test_a_parameter_that_hardly_moves_the_model_has_a_wide_interval() -> None:
+    faint = np.full((20, 16, 1), 1e-180)
+    noise = np.random.default_rng(4).normal(size=(20, 16))
+    value = values(replace(found_in(0)[0], error=noise, jacobian=faint))[STRENGTH]
+    assert value.interval is not None
+    assert value.interval[0] < -1e60
+    assert value.interval[1] > 1e60

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from rigwatch.commands import main
+from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data.signals import prepare
 from rigwatch.workbench.study.study import open_study
+from rigwatch.workbench.study.told_units import told_unit
 from sim_plant.machines import MACHINES, log
 
 MOTOR = ["--model", "motor", "--set", "R=2.0", "--set", "K=0.06"]
@@ -39,6 +41,12 @@ def speed(folder: Path) -> np.ndarray:
 def test_usual_spellings_of_a_unit_are_read(tmp_path, run, header):
     assert made(tmp_path, run, header) == 0
     np.testing.assert_allclose(speed(tmp_path), run["speed_rad_s"][:100], rtol=1e-9, atol=1e-9)
+    study = open_study(tmp_path / "study")
+    assert told_unit(study.model.outputs["speed"]) == "rpm"
+    path = tmp_path / "study" / "study.toml"
+    path.write_text(path.read_text().replace('"rpm"', '"V"'))
+    with pytest.raises(ModelError, match=r"shown\.speed: .*'V'"):
+        open_study(tmp_path / "study")
 
 
 def test_a_unit_that_is_not_known_is_asked_for(tmp_path, run, capsys):

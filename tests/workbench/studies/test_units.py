@@ -37,7 +37,7 @@ name = "cylinder"
 summary = "A spring that follows late, and a piston."
 inputs.position = {{ unit = "{length}" }}
 inputs.pressure = {{ unit = "{pressure}" }}
-outputs.force = {{ unit = "N", expression = "k*z + area*(pressure - p0) + load" }}
+outputs.force = {{ unit = "{force}", expression = "k*z + area*(pressure - p0) + load" }}
 [states.z]
 unit = "{length}"
 derivative = "(position - z)/tau"
@@ -144,8 +144,11 @@ def test_the_same_study_in_other_units_has_the_same_fit(pair: tuple[Study, Study
         assert shown.unit == unit
         assert shown.value == pytest.approx(one.value * size, rel=1e-9)
         assert shown.interval == pytest.approx(np.multiply(one.interval, size), rel=1e-6)
-    line = next(line for line in comparison_lines(other) if line.startswith("  tau "))
-    assert line.endswith(" ms")
+    lines = comparison_lines(other)
+    assert next(line for line in lines if line.startswith("  tau ")).endswith(" ms")
+    assert other.unit == "N"
+    told = next(line for line in lines if line.startswith("  force ")).split()
+    assert told[1:3] == ["kN", f"{other.train_error / 1e3:.4g}"]
 
 
 def test_the_same_study_in_other_units_has_the_same_verdict(pair: tuple[Study, Study]) -> None:
@@ -156,6 +159,8 @@ def test_the_same_study_in_other_units_has_the_same_verdict(pair: tuple[Study, S
     one, shown = (found.ranking[0] for found in (si, other))
     assert one.effect == shown.effect == "stop"
     assert shown.parameters["gap"].unit == "mm"
+    errors = (other.comparison.held_out_error, shown.held_out_error)
+    assert "from {:.3g} to {:.3g} kN".format(*(error / 1e3 for error in errors)) in other.text
     assert shown.parameters["gap"].value == pytest.approx(2.0, rel=0.1)
     assert one.parameters["gap"].value == pytest.approx(0.002, rel=0.1)
 

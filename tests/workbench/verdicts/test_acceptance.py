@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from rigwatch.workbench.compare import open_bench
 from rigwatch.workbench.explain.explain import explain
+from rigwatch.workbench.ranking import rank_only, refit, shapes_of
 from rigwatch.workbench.ranking.paired_test import difference
 from rigwatch.workbench.steps.change import add
 from tests.workbench.dampers import damper, effect
@@ -111,7 +113,13 @@ TIED = effect(
 
 
 def test_a_strength_that_may_as_well_be_neutral_is_not_accepted(tmp_path: Path) -> None:
-    change = add(damper(tmp_path, rubbing, TIED), "tied")
+    study = damper(tmp_path, rubbing, TIED)
+    bench = open_bench(study)
+    shapes = shapes_of(bench.study, bench.data.train, "tied", "load")
+    row = rank_only(bench.study, bench.data, bench.base, shapes)
+    refit(bench.study, bench.data, bench.base, row)
+    assert row.vague
+    change = add(study, "tied")
     assert change.step == "refused"
     assert "the training does not determine its strength" in change.text
     assert change.tried is not None

@@ -5,12 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigwatch.workbench.compare import open_bench
 from rigwatch.workbench.explain import explain
+from rigwatch.workbench.explain.exchange import exchange, of_a_kind
+from rigwatch.workbench.ranking import no_progress
 from rigwatch.workbench.steps.change import add, undo
 from rigwatch.workbench.study import open_study
 from tests.workbench.dampers import damper
 
-STIFFNESS, LIMIT = 8e3, 20.0
+STIFFNESS, LIMIT, MORE, SLOW = 8e3, 20.0, 0.4, 0.015
 
 
 def slider_behind(gap: float):
@@ -46,3 +49,33 @@ def test_a_slider_that_turns_out_to_be_behind_play_is_offered_in_its_place(
     after = add(open_study(study.folder), found.effect, found.port).after
     assert after.held_out_error == pytest.approx(found.held_out_error, rel=0.05)
     assert after.held_out_error < before.comparison.held_out_error
+
+
+def held_harder_at_low_speed(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Force of a spring whose slider yields by a power law of the speed, returned to its limit."""
+    stretched, found = 0.0, np.empty_like(x)
+    for index, step in enumerate(np.diff(x, prepend=x[0])):
+        limit = LIMIT * (1 + MORE / (1 + abs(v[index]) / SLOW))
+        stretched = float(np.clip(stretched + STIFFNESS * step, -limit, limit))
+        found[index] = stretched
+    return found
+
+
+def test_a_slider_that_holds_harder_at_low_speed_is_offered_for_a_constant_one(
+    tmp_path: Path,
+) -> None:
+    study = damper(tmp_path, held_harder_at_low_speed)
+    before = add(study, "jenkins", "load").after
+    bench = open_bench(open_study(study.folder))
+    found = exchange(bench, no_progress)
+    assert found is not None
+    assert found.effect == "elastoplastic"
+    undo(open_study(study.folder))
+    after = add(open_study(study.folder), found.effect, found.port).after
+    assert after.held_out_error == pytest.approx(found.held_out_error, rel=0.05)
+    assert after.held_out_error < 0.4 * before.held_out_error
+    values = {name.split("_")[-1]: v.value for name, v in after.parameters.items()}
+    assert values["Fc"] * values["s"] == pytest.approx(STIFFNESS, rel=0.05)
+    assert values["Fc"] == pytest.approx(LIMIT, rel=0.1)
+    # What it contains cannot describe it better.
+    assert "jenkins" not in of_a_kind(open_study(study.folder), "elastoplastic", "load")

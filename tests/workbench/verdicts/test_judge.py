@@ -11,6 +11,7 @@ from rigwatch.physics.engine.equations import Placement
 from rigwatch.physics.engine.fit import Fit
 from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.data import NoiseFloor
+from rigwatch.workbench.explain.several_effects import with_similar
 from rigwatch.workbench.explain.verdict import Verdict, judge, not_converged
 from rigwatch.workbench.explain.verdict_calibration import CLEAR, probability_wrong
 from rigwatch.workbench.fit import Fitted
@@ -32,7 +33,7 @@ def leaving(squares: np.ndarray, outputs: int = 1) -> Fitted:
     known: dict[str, dict[str, Any]] = {"ports": {}, "quantities": {}}
     model = SimpleNamespace(
         driving=lambda: ("u",),
-        outputs={str(k): SimpleNamespace(unit="mm") for k in range(outputs)},
+        outputs={str(k): SimpleNamespace(unit="N", shown="") for k in range(outputs)},
         **known,
     )
     compiled: Any = SimpleNamespace(system=SimpleNamespace(model=model))
@@ -66,8 +67,9 @@ def row(
     """An effect with a held-out error, worse than a steady one of it by standard deviations."""
     name, port = label.split("@")
     effect: Any = SimpleNamespace(
-        free=free, family=family, refines=refines, sampled=sampled, time_shift=shift
-    )
+        free=free, family=family, refines=refines, sampled=sampled, time_shift=shift,
+        confused_with=("radiation",),
+    )  # fmt: skip
     found = Ranked(
         Placement(name, effect, port), kind, 0.0, 0.5, {}, list(alike), cosines or {}, {}
     )
@@ -132,7 +134,7 @@ def test_the_only_effect_that_helps_is_missing() -> None:
     found = judge(base(3.0), [only, row("b@x", accepted=False, cosines={})], PERIODS)
     assert (found.word, found.best, found.members) == ("missing_effect", only, ("coulomb@load",))
     assert (found.rivals, found.second) == ((), ())
-    assert found.text == ("coulomb@load is missing: the held-out error falls from 3 to 1.05 mm")
+    assert found.text == ("coulomb@load is missing: the held-out error falls from 3 to 1.05 N")
     assert found.evidence.left == pytest.approx((1.05**2 - 1) / (3**2 - 1))
     assert found.probability_wrong == probability_wrong("missing_effect", found.evidence)
 
@@ -197,6 +199,25 @@ def test_an_effect_that_leads_on_the_recordings_held_out_alone_is_not_named(
     assert ("b@x explains more of all recordings together" in found.text) == (
         word == "undetermined"
     )
+
+
+@pytest.mark.parametrize(
+    ("training", "free", "named"),
+    [
+        pytest.param(2.0, 1, "b@x", id="leaves less of all"),
+        pytest.param(2.6, 1, "coulomb@load", id="leaves more of all"),
+        pytest.param(2.0, 2, "coulomb@load", id="no simpler"),
+    ],
+)
+def test_a_parameter_more_that_pays_held_out_alone_is_not_named(
+    training: float, free: int, named: str
+) -> None:
+    only = trained(best(error=1.5, family="drag", free=2), 2.4)
+    simpler = trained(row("b@x", 1.6, family="drag", free=free), training)
+    found = judge(replace(base(), train=base(2.9).train), [only, simpler], QUIET)
+    assert found.word == "missing_effect"
+    assert found.best is not None
+    assert found.best.label == named
 
 
 def test_what_hardly_lowers_the_training_error_is_not_named_with_confidence() -> None:
@@ -514,3 +535,23 @@ def test_where_training_and_held_out_disagree_nothing_is_named_alone() -> None:
 def _with_training_error(of: Ranked, error: float) -> None:
     assert of.fitted is not None
     of.fitted = replace(of.fitted, train=base(error).train)
+
+
+@pytest.mark.parametrize(
+    ("label", "error", "accepted", "word"),
+    [
+        pytest.param("radiation@x", 1.3, True, "undetermined", id="nearly as good"),
+        pytest.param("radiation@x", 1.6, True, "missing_effect", id="much worse"),
+        pytest.param("radiation@x", 1.3, False, "missing_effect", id="refused"),
+        pytest.param("radiation@y", 1.3, True, "missing_effect", id="elsewhere"),
+        pytest.param("leakage@x", 1.3, True, "missing_effect", id="of another kind"),
+    ],
+)
+def test_what_a_set_bends_into_a_similar_law_is_not_named_alone(
+    label: str, error: float, accepted: bool, word: str
+) -> None:
+    rows = [best("convection@x"), row(label, error, accepted=accepted)]
+    named = Verdict("missing_effect", rows[0], ("convection@x",), (), "convection@x is missing")
+    found = with_similar(named, rows)
+    assert found.word == word
+    assert found.rivals == ((label,) if word == "undetermined" else ())

@@ -17,7 +17,7 @@ from rigwatch.workbench.explain.combinations import (
 )
 from rigwatch.workbench.explain.several_effects import _judge_each, _ranked_with
 from rigwatch.workbench.ranking import candidates, no_progress, rank, refit, scored
-from rigwatch.workbench.ranking.rank import _unfitted_similar
+from rigwatch.workbench.ranking.rank import _substitute_of_vague, _unfitted_similar
 from rigwatch.workbench.ranking.ranked import Ranked
 from tests.workbench.dampers import damper
 
@@ -59,6 +59,18 @@ def test_an_effect_is_exchanged_for_what_resembles_it_at_any_port_or_is_of_its_f
     assert _substitutes(offset, every) == [smoothing, force]
     assert _substitutes(presliding, every) == [coulomb]
     assert _substitutes(other, every) == []
+
+
+def test_what_was_skipped_for_an_effect_of_open_strength_is_fitted_at_its_port() -> None:
+    convection, radiation = effect("convection@loss"), effect("radiation@loss")
+    offset = effect("offset@heater")
+    radiation.fitted_instead = offset.fitted_instead = "convection@loss"
+    every = [convection, offset, radiation]
+    assert _substitute_of_vague(every) is None
+    convection.vague = True
+    assert _substitute_of_vague(every) is radiation
+    radiation.failure = "diverges"
+    assert _substitute_of_vague(every) is None
 
 
 def test_an_effect_of_a_set_is_compared_though_it_looks_like_another(tmp_path: Path) -> None:

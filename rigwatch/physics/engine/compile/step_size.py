@@ -72,9 +72,16 @@ def pace(system: System) -> Pace:
 
 
 def constant_rates(system: System) -> tuple[sympy.Expr, ...]:
-    """|∂(dx/dt)/∂x| of the model's states, where it depends on parameters alone [1/s]."""
+    """|∂(dx/dt)/∂x| of the model's states, where it depends on parameters alone [1/s].
+
+    They are the model's own: an effect that adds to such a slope, as a brush's drop does to that of
+    a current, leaves the mode as fast as it is without it.
+    """
+    if not system.model.states:
+        return ()
     known = {symbol(name) for name in system.parameters}
-    slopes = (derivative(system.derivatives[name], symbol(name)) for name in system.model.states)
+    bare = compose(system.model).derivatives
+    slopes = (derivative(bare[name], symbol(name)) for name in system.model.states)
     return tuple(dict.fromkeys(s for s in slopes if s.free_symbols and s.free_symbols <= known))
 
 
