@@ -5,7 +5,7 @@ import pytest
 from msgspec.structs import replace
 
 from rigwatch.physics.engine.compile.compiled_system import compile_system
-from rigwatch.physics.engine.compile.resolved_rates import resolved
+from rigwatch.physics.engine.compile.resolved_rates import FASTEST, resolved
 from rigwatch.physics.engine.compile.step_size import (
     FINEST,
     INSTANT,
@@ -16,6 +16,7 @@ from rigwatch.physics.engine.compile.step_size import (
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import Placement, compose
+from rigwatch.physics.engine.fit import Recording, fit
 from rigwatch.physics.engine.score.compatibility import suits
 
 MODEL = shipped_models()["mass-spring-damper"]
@@ -200,3 +201,23 @@ def test_a_mode_at_the_bound_is_followed_by_stable_steps():
     ]  # fmt: skip
     # The initial current gives the rotor K·L/R·i at once, and nothing later.
     assert ends[1] - ends[0] == pytest.approx(0.1 * slow[2] / 1.0 / 1e-3, rel=0.05)
+
+
+def test_a_fit_stops_where_the_recording_no_longer_resolves_a_rate_of_two_free_parameters():
+    # The speed alone shows R·J/K² only.
+    loose = {"R": replace(MOTOR.parameters["R"], fixed=False, low=0.1)}
+    known = {"J": replace(MOTOR.parameters["J"], fixed=True)}
+    changed = replace(MOTOR, parameters=MOTOR.parameters | loose | known)
+    compiled = compile_system(compose(changed))
+    voltage = np.sign(np.sin(np.arange(600) * COARSE * 9.0))[:, None] * 6.0
+    truth = {"L": 5e-5, "R": 1.6, "K": 0.1, "J": 1e-3, "b": 1e-4}
+    speed = compiled.simulate(
+        voltage, COARSE, np.zeros(1, np.int64), 600,
+        initial=np.zeros((1, 2)), parameters=compiled.vector(truth),
+    ).outputs[0]  # fmt: skip
+    noise = 0.05 * np.random.default_rng(3).standard_normal(speed.shape)
+    recording = Recording(COARSE, voltage, speed + noise)
+    found = fit(compiled, recording, 100, start=compiled.vector({"L": 5e-3, "R": 1.0}))
+    assert found.values()["R"] / found.values()["L"] * COARSE <= FASTEST * 1.001
+    assert found.values()["R"] == pytest.approx(1.6, rel=1e-3)
+    assert found.rms[0] < 1.1 * 0.05

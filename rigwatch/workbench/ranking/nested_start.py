@@ -54,10 +54,9 @@ def _nest(  # noqa: PLR0917 -- they belong together
         return
     again = replace(row, start=row.start | _shared(row, simpler))
     refit(study, data, base, again, fit_from(simpler.fitted))
-    if again.fitted is None or (row.fitted and row.fitted.train_error <= again.fitted.train_error):
-        return
-    row.fitted, row.gain, row.accepted = again.fitted, again.gain, again.accepted
-    row.reason, row.failure = again.reason, again.failure
+    found = again.fitted
+    if found and (row.fitted is None or found.train_error < row.fitted.train_error):
+        row.take(again)
 
 
 def _refined(

@@ -77,6 +77,11 @@ class Ranked:
         """Effect and port as "effect@port"."""
         return f"{self.effect}@{self.port}"
 
+    def take(self, other: "Ranked") -> None:
+        """Store the fit of another row of the same effect, and its decision."""
+        self.fitted, self.gain, self.accepted = other.fitted, other.gain, other.accepted
+        self.reason, self.failure, self.vague = other.reason, other.failure, other.vague
+
     def begin(self, share: float = 1.0) -> dict[str, float]:
         """Initial values of its fit, by the system's names, at a share of its strength."""
         effect, values = self.placement.effect, dict(self.start)

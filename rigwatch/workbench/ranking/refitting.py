@@ -110,7 +110,7 @@ def fit_each(  # noqa: PLR0917 -- they belong together
             waiting = [r for r in rows[number - 1 :] if not any(_is_unlike(r, o) for o in enough)]
             ahead = {each.label: replace(each) for each in waiting[: cores()]}
             refit_all(study, data, base, list(ahead.values()), fit_model)
-        _take(row, ahead[row.label])
+        row.take(ahead[row.label])
         if row.accepted and leaves_nothing(row, base, own_floor(study, data, floor, row)):
             enough.append(row)
     return enough
@@ -124,12 +124,6 @@ def own_floor(study: Study, data: Data, floor: NoiseFloor, row: Ranked) -> Noise
     assert row.fitted is not None
     fitted, recording = row.fitted.held_out, data.held_out
     return lowered(floor, fitted, recording, study.file.period, data.horizon)
-
-
-def _take(row: Ranked, fitted: Ranked) -> None:
-    """Store the fit of a copy of the row in it."""
-    row.fitted, row.gain, row.accepted = fitted.fitted, fitted.gain, fitted.accepted
-    row.reason, row.failure, row.vague = fitted.reason, fitted.failure, fitted.vague
 
 
 def _is_unlike(row: Ranked, other: Ranked) -> bool:

@@ -17,7 +17,6 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from rigwatch.physics.engine.compile.step_size import ACCURATE, STABLE
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.kernel import kernel
 
@@ -26,10 +25,6 @@ TINY = 1e-200
 """Magnitude below which a sampled state is set to zero."""
 WIDE = 1.5
 """Allowed change of a state in an interval, relative to an Euler step."""
-LINEAR = 0.05
-"""Relative change of a rate across an interval up to which it counts as constant."""
-RELAXED = ACCURATE / STABLE
-"""Steps that a constant rate asks for, relative to those of one that changes."""
 
 
 def _call(  # noqa: PLR0917 -- numba wants them by name
@@ -158,8 +153,7 @@ def needed(  # noqa: PLR0917 -- a kernel
     """Number of steps that `pace` requires in the next interval.
 
     Evaluated at its start, at its end after one Euler step, and where the states in `crossing` come
-    closest to zero. Rates of those states, the first ones, ask for accuracy where they change. At
-    rest they do not, and only have to be stable.
+    closest to zero.
     """
     n, up, ap = dx.size, us.ctypes.data, asked.ctypes.data
     place(u, row, 0.0, 0.0, hold, rows, dt, us)
@@ -171,19 +165,13 @@ def needed(  # noqa: PLR0917 -- a kernel
     for i in crossing:
         middle, reach = 0.5 * (z[i] + end[i]), 0.5 * WIDE * abs(end[i] - z[i])
         near[i] = math.copysign(max(abs(middle) - reach, 0.0), middle)
-    for j in range(asked.shape[1]):
-        asked[1, j], asked[2, j] = np.inf, 0.0
+    worst = 0.0
     for at, share in ((z, 0.0), (near, 0.0), (end, 1.0)):
         if share > 0.0:
             place(u, row, share, share, hold, rows, dt, us)
         call(pace, (row + share) * dt, at.ctypes.data, up, pp, ap, ap)
-        for j in range(asked.shape[1]):
-            asked[1, j] = min(asked[1, j], abs(asked[0, j]))
-            asked[2, j] = max(asked[2, j], abs(asked[0, j]))
-    worst = 0.0
-    for j in range(asked.shape[1]):
-        constant = j < crossing.size and asked[1, j] >= (1.0 - LINEAR) * asked[2, j]
-        worst = max(worst, RELAXED * asked[2, j] if constant else asked[2, j])
+        for rate in asked:
+            worst = max(worst, abs(rate))
     return worst * dt
 
 
@@ -200,7 +188,7 @@ def simulate(  # noqa: PLR0917 -- a kernel
     `finest` as the `asked` rates of `pace` require.
     """
     n, size = x0.shape[1], x0.shape[1] * (1 + m)
-    dx, end, near, rate = np.empty(n), np.empty(n), np.empty(n), np.empty((3, asked))
+    dx, end, near, rate = np.empty(n), np.empty(n), np.empty(n), np.empty(asked)
     z, dz, times = np.empty(size), np.empty(size), np.empty(4)
     between = np.empty((3, u.shape[1] + 1))
     us, wanted, late = np.empty(u.shape[1] + 1), y.shape[2], lateness(hold)

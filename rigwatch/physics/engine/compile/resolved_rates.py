@@ -18,6 +18,10 @@ from rigwatch.physics.engine.compile.step_size import INSTANT, constant_rates, f
 from rigwatch.physics.engine.equations import Parameter, System
 from rigwatch.wire.arrays import FloatArray
 
+FASTEST = 4.0 * INSTANT
+"""Rate times the time between samples beyond which a fit takes no rate of several free parameters.
+Where the noise is below 0.2 % of the signal a recording resolves more than `INSTANT`.
+"""
 ROUNDING = 1.0 + 1e-9
 """Ratio by which a rate beyond the limit may still grow, so that it is between its own bounds."""
 HALVINGS = 60
@@ -59,7 +63,7 @@ def resolved_from(system: System, parameters: FloatArray, spacing: float) -> Sys
         names = sorted({str(each) for each in rate.free_symbols} & set(system.free))
         reached = spacing * fastest_of(system, (rate,), parameters)
         if names and 0.0 < reached < np.inf:
-            limit = reached * (max(INSTANT / reached, ROUNDING) ** (1.0 / len(names)))
+            limit = reached * (max(FASTEST / reached, ROUNDING) ** (1.0 / len(names)))
             for name in names:
                 bounded[name] = _bounded(
                     system, bounded[name], name, rate, parameters, spacing, limit

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import INSTANT, CompiledSystem, Simulation
+from rigwatch.physics.engine.compile import FASTEST, CompiledSystem, Simulation
 from rigwatch.physics.engine.fit.initial_state_projection import Tangent
 from rigwatch.physics.engine.fit.recorded_effect_states import RecordedEffectStates
 from rigwatch.physics.engine.fit.recording import Recording, cut_for, initial_states, shown_states
@@ -160,7 +160,7 @@ class Problem:
         """
         self.unresolved = False
         reached = self.compiled.fastest(parameters) * self.recording.dt
-        self._fastest = max(INSTANT, reached)
+        self._fastest = max(FASTEST, reached)
 
     def hold(self, initial: FloatArray, columns: IntArray) -> None:
         """Set the initial states of windows and fix some of the states."""

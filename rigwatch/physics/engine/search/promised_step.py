@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import INSTANT
+from rigwatch.physics.engine.compile import FASTEST
 from rigwatch.physics.engine.fit import Fit, Recording, bounds, error_at
 from rigwatch.physics.engine.search.convergence import (
     PROMISED,
@@ -36,7 +36,7 @@ def kept_promise(fitted: Fit, recording: Recording, horizon: int, substeps: int)
         return promised
 
     system = fitted.compiled
-    resolved = max(INSTANT, system.fastest(fitted.parameters) * recording.dt)
+    resolved = max(FASTEST, system.fastest(fitted.parameters) * recording.dt)
 
     def size(parameters: FloatArray) -> float:
         # A fit goes no further than the recording resolves.

@@ -20,7 +20,7 @@ from functools import partial
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import INSTANT, CompiledSystem
+from rigwatch.physics.engine.compile import FASTEST, CompiledSystem
 from rigwatch.physics.engine.fit import Fit, Recording, error_at, fit
 from rigwatch.physics.engine.search.convergence import PROMISED, spread
 from rigwatch.physics.engine.search.drawn_starts import drawn_start
@@ -129,7 +129,7 @@ class ShortHorizons:
     def _drawn(self, begin: FloatArray, generator: np.random.Generator) -> FloatArray:
         """A random start at which the recording resolves the model's modes, if one is found."""
         compiled, spacing = self.compiled, self.recording.dt
-        resolved = max(INSTANT, compiled.fastest(begin) * spacing)
+        resolved = max(FASTEST, compiled.fastest(begin) * spacing)
         for _ in range(DRAWS):
             found = drawn_start(compiled.system, begin, generator)
             if compiled.fastest(found) * spacing <= resolved:
