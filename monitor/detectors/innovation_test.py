@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc, chdtri
 
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel
@@ -67,7 +67,7 @@ def push_nis(window: NisWindow, nis: float) -> float:
 
 def nis_limit(length: int, measurements: int, false_alarm: float) -> float:
     """Limit of the sum over `length` samples of `measurements` each, at `false_alarm`."""
-    return float(chi2.isf(false_alarm, length * measurements))
+    return float(chdtri(length * measurements, false_alarm))
 
 
 def whiteness(innovations: FloatArray, lags: int) -> tuple[float, float]:
@@ -81,4 +81,4 @@ def whiteness(innovations: FloatArray, lags: int) -> tuple[float, float]:
     power = float(centred @ centred)
     correlations = np.array([centred[lag:] @ centred[:-lag] for lag in range(1, lags + 1)]) / power
     statistic = float(innovations.size * np.sum(correlations**2))
-    return statistic, float(chi2.sf(statistic, lags))
+    return statistic, float(chdtrc(lags, statistic))

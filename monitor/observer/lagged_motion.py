@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import savgol_coeffs
 
 from monitor.signals import DEAD, GOOD, NEW_BOOT, RESTART, Codes
 from rigwatch.wire.arrays import FloatArray
@@ -84,11 +84,13 @@ def _kernel(order: int, half_width: int, rate: float, late: float) -> FloatArray
         return np.asarray(0.5 * (np.eye(width)[half_width + 1] - np.eye(width)[half_width - 1]))
     if order == MATCHED:
         # The kernel of the second derivative is a second difference of a smoothing one.
-        second = savgol_coeffs(width, 3, deriv=2, delta=1.0, use="dot")
+        second = scipy.signal.savgol_coeffs(width, 3, deriv=2, delta=1.0, use="dot")
         smoothing = np.cumsum(np.cumsum(second))[:-2]
         return np.asarray(np.concatenate([[0.0], smoothing, [0.0]]), np.float64)
     at = half_width + late * rate
-    return np.asarray(savgol_coeffs(width, 3, deriv=order, delta=1.0 / rate, pos=at, use="dot"))
+    return np.asarray(
+        scipy.signal.savgol_coeffs(width, 3, deriv=order, delta=1.0 / rate, pos=at, use="dot")
+    )
 
 
 @kernel()

@@ -16,8 +16,8 @@ therefore judged above a corner frequency: H is a second-order Butterworth high-
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numba import njit
-from scipy.signal import butter
 
 from monitor.model import RemainderSection
 from monitor.observer.lagged_motion import EMPTY, FIRST
@@ -71,7 +71,7 @@ def levels(motion: FloatArray, predicted: FloatArray, known: RemainderSection) -
 
 def high_pass(corner: float, rate: float) -> tuple[FloatArray, FloatArray]:
     """Numerator and denominator of H."""
-    b, a = butter(2, 2.0 * corner / rate, "high")
+    b, a = scipy.signal.butter(2, 2.0 * corner / rate, "high")
     return np.asarray(b), np.asarray(a)
 
 

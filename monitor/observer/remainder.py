@@ -7,7 +7,7 @@ regression keeps terms small that the recordings do not determine.
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.signal import lfilter
+import scipy
 
 from monitor.model import RemainderSection
 from monitor.observer.missing_force import terms
@@ -37,7 +37,9 @@ def fit_remainder(
     """
     every = np.concatenate([signals[skip:] for signals, _ in parts])
     centre, scale = every.mean(axis=0), np.maximum(every.std(axis=0), 1e-12)
-    columns = [lfilter(*filters, terms(z, centre, scale), axis=0)[skip:] for z, _ in parts]
+    columns = [
+        scipy.signal.lfilter(*filters, terms(z, centre, scale), axis=0)[skip:] for z, _ in parts
+    ]
     phi, left = np.concatenate(columns), np.concatenate([e[skip:] for _, e in parts])
     size = np.maximum(phi.std(axis=0), 1e-12)
     phi = phi / size

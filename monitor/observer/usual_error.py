@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from monitor.drives import BANDS, same_drive
 from monitor.model import HealthyLimits
@@ -132,7 +132,7 @@ class _Smooth:
         rows = np.stack([np.minimum(seen.narrow, NARROWEST), seen.pace, seen.size])
         share, kept = self._share, self._kept
         kept = (1.0 - share) * rows[:, :1] if kept is None else kept
-        smooth, self._kept = lfilter([share], [1.0, share - 1.0], rows, zi=kept)
+        smooth, self._kept = scipy.signal.lfilter([share], [1.0, share - 1.0], rows, zi=kept)
         return Spectrum(*smooth)
 
 

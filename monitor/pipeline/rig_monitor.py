@@ -11,19 +11,22 @@ blocks.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from monitor.alarms import AlarmManager, Announcement, SensorFlags, settings_of
 from monitor.detectors import Detector
 from monitor.model import EquationsPlant, RigModel
-from monitor.pipeline.observer_pipeline import ObserverMonitor
 from monitor.pipeline.pipeline import Monitor
 from monitor.signals import GAP, SENSOR_CLIPPED, SENSOR_INVALID, Condition, above
 from monitor.wiring import WIRING, WiringCheck
 from rigwatch.wire.arrays import BoolArray
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock, cut
 from rigwatch.wire.rig_config import AlarmSection
+
+if TYPE_CHECKING:
+    from monitor.pipeline.observer_pipeline import ObserverMonitor
 
 OF_SAMPLES = frozenset({GAP, SENSOR_CLIPPED, SENSOR_INVALID})
 """Conditions of the samples themselves, independent of the friction scheme."""
@@ -164,13 +167,18 @@ def _silenced(condition: Condition, wrong: BoolArray) -> Condition:
     return condition._replace(active=np.where(wrong, 0, condition.active).astype(np.uint8))
 
 
-def scheme_of(model: RigModel) -> Monitor | ObserverMonitor:
+def scheme_of(model: RigModel) -> "Monitor | ObserverMonitor":
     """The scheme for a model's plant.
 
     Raises:
         ModelError: its equations are invalid.
     """
-    return ObserverMonitor(model) if isinstance(model.plant, EquationsPlant) else Monitor(model)
+    if not isinstance(model.plant, EquationsPlant):
+        return Monitor(model)
+    # Symbolic equations are slow to import.
+    from monitor.pipeline.observer_pipeline import ObserverMonitor
+
+    return ObserverMonitor(model)
 
 
 def compile_kernels(model: RigModel, detectors: Sequence[Detector] = ()) -> None:

@@ -9,8 +9,8 @@ averaged over overlapping Hann segments (Welch). The variance of H1 is about
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import csd, welch
 
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
@@ -76,9 +76,9 @@ def frequency_response(
         raise ModelError("frequency response: found a constant input, expected an excitation")
     length = int(min(segment * sample_rate, u.size / 4))
     options = {"fs": sample_rate, "nperseg": length, "noverlap": length * 3 // 4}
-    frequency, suu = welch(u, **options)
-    _, syy = welch(y, **options)
-    _, suy = csd(u, y, **options)
+    frequency, suu = scipy.signal.welch(u, **options)
+    _, syy = scipy.signal.welch(y, **options)
+    _, suy = scipy.signal.csd(u, y, **options)
     floor = np.finfo(np.float64).tiny
     coherence = np.abs(suy) ** 2 / np.maximum(suu * syy, floor)
     return FrequencyResponse(

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import csd, welch
+import scipy
 
 from rigwatch.wire.arrays import FloatArray
 
@@ -118,9 +118,9 @@ def _spectra(pairs: Sequence[Pair], order: int) -> tuple[FloatArray, FloatArray,
         steep, level = _differentiated(channel, rate, order)
         settings = {"nperseg": SEGMENT, "detrend": "constant", "scaling": "spectrum"}
         weight = len(steep) / SEGMENT
-        own.append(weight * welch(steep, **settings)[1])
-        other.append(weight * welch(level, **settings)[1])
-        cross.append(weight * csd(steep, level, **settings)[1])
+        own.append(weight * scipy.signal.welch(steep, **settings)[1])
+        other.append(weight * scipy.signal.welch(level, **settings)[1])
+        cross.append(weight * scipy.signal.csd(steep, level, **settings)[1])
         segments += weight
     return sum(own), sum(other), sum(cross), segments
 

@@ -11,7 +11,7 @@ F stable throughout.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
+import scipy
 
 from rigwatch.physics.transfer.levenberg import (
     Descent,
@@ -115,7 +115,10 @@ class _Search:
     def _linear(self, f: FloatArray) -> FloatArray:
         """F·y = B·u with both signals filtered by the last 1/F, then B alone for the kept F."""
         a = np.concatenate([[1.0], f])
-        filtered_u, filtered_y = lfilter([1.0], a, self.u), lfilter([1.0], a, self.y)
+        filtered_u, filtered_y = (
+            scipy.signal.lfilter([1.0], a, self.u),
+            scipy.signal.lfilter([1.0], a, self.y),
+        )
         columns = self._delays(filtered_u, self._input_delays())
         columns += [-c for c in self._delays(filtered_y, range(1, self.orders.nf + 1))]
         theta = least_squares_coefficients(
@@ -125,7 +128,7 @@ class _Search:
         return np.concatenate([self._best_numerator(stable), stable[1:]])
 
     def _best_numerator(self, a: FloatArray) -> FloatArray:
-        filtered = lfilter([1.0], a, self.u)
+        filtered = scipy.signal.lfilter([1.0], a, self.u)
         columns = np.column_stack(self._delays(filtered, self._input_delays()))
         return least_squares_coefficients(columns[self.skip :], self.y[self.skip :])
 
@@ -138,7 +141,7 @@ class _Search:
 
     def errors(self, theta: FloatArray) -> FloatArray:
         model = self.function(theta)
-        return np.asarray((self.y - lfilter(model.b, model.a, self.u))[self.skip :])
+        return np.asarray((self.y - scipy.signal.lfilter(model.b, model.a, self.u))[self.skip :])
 
     def cost(self, theta: FloatArray) -> float:
         cost = float(np.sum(self.errors(theta) ** 2))
@@ -146,8 +149,10 @@ class _Search:
 
     def gradient(self, theta: FloatArray) -> FloatArray:
         model = self.function(theta)
-        filtered_u = lfilter([1.0], model.a, self.u)
-        filtered_y = lfilter([1.0], model.a, lfilter(model.b, model.a, self.u))
+        filtered_u = scipy.signal.lfilter([1.0], model.a, self.u)
+        filtered_y = scipy.signal.lfilter(
+            [1.0], model.a, scipy.signal.lfilter(model.b, model.a, self.u)
+        )
         columns = self._delays(filtered_u, self._input_delays())
         columns += [-c for c in self._delays(filtered_y, range(1, self.orders.nf + 1))]
         return np.column_stack(columns)[self.skip :]

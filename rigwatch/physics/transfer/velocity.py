@@ -13,10 +13,12 @@ Both keep a zero at the origin, so an accelerometer bias does not cause a veloci
 transform makes the integrator trapezoidal; its pole is cancelled, so there is no drift.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
-from scipy.signal import bilinear
 
 from rigwatch.physics.transfer.transfer_function import TransferFunction
+from rigwatch.wire.arrays import FloatArray
 
 
 def velocity_filter(
@@ -32,5 +34,18 @@ def velocity_filter(
     """
     c, p = 2.0 * np.pi * corner, 2.0 * np.pi * sensor_corner
     lead = 2.0 * c + p if compensate_lead else 0.0
-    b, a = bilinear([1.0, lead, 0.0], [1.0, 2.0 * c, 2.0 * c**2, c**3], sample_rate)
-    return TransferFunction.of(b, a)
+    b = _bilinear([0.0, 1.0, lead, 0.0], sample_rate)
+    a = _bilinear([1.0, 2.0 * c, 2.0 * c**2, c**3], sample_rate)
+    return TransferFunction.of(b / a[0], a / a[0])
+
+
+def _bilinear(coefficients: Sequence[float], sample_rate: float) -> FloatArray:
+    """A polynomial of s at s = 2·f·(z - 1)/(z + 1), times (z + 1)ⁿ; highest powers first.
+
+    SciPy has it too, in a package that takes longer to import than the rest of a monitor's start.
+    """
+    degree, found = len(coefficients) - 1, np.zeros(len(coefficients))
+    for power, coefficient in enumerate(reversed(coefficients)):
+        zeros = [1.0] * power + [-1.0] * (degree - power)
+        found += coefficient * (2.0 * sample_rate) ** power * np.poly(zeros)
+    return found
