@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from scipy.signal import cheby1, lfilter, sosfiltfilt
+import scipy
 
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
@@ -52,13 +52,13 @@ class Thinning:
                 f" {self.factor * (2 * self.edge + 4)} to thin it by {self.factor}"
             )
         if self.high_pass:
-            part = lfilter(*self.high_pass, part, axis=1)
+            part = scipy.signal.lfilter(*self.high_pass, part, axis=1)
         if self.factor > 1:
-            part = sosfiltfilt(_low_pass(self.factor), part, axis=1)[:, :: self.factor]
+            part = scipy.signal.sosfiltfilt(_low_pass(self.factor), part, axis=1)[:, :: self.factor]
         return part[:, self.edge : part.shape[1] - self.edge]
 
 
 @cache
 def _low_pass(factor: int) -> FloatArray:
     """The filter of `scipy.signal.decimate`, designed once; second-order sections (…, 6)."""
-    return np.asarray(cheby1(8, 0.05, 0.8 / factor, output="sos"))
+    return np.asarray(scipy.signal.cheby1(8, 0.05, 0.8 / factor, output="sos"))

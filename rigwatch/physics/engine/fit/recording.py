@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import savgol_filter
+import scipy
 
 from rigwatch.physics.engine.equations import System
 from rigwatch.physics.engine.fit.decimation import Thinning
@@ -150,7 +150,7 @@ def _rate(channel: FloatArray, smoothed: int, dt: float) -> FloatArray:
     width = min(smoothed, len(channel) - 1 + len(channel) % 2)
     if width < 5:
         return np.zeros(len(channel))
-    return np.asarray(savgol_filter(filled(channel), width, 3, deriv=1, delta=dt))
+    return np.asarray(scipy.signal.savgol_filter(filled(channel), width, 3, deriv=1, delta=dt))
 
 
 def shown_states(system: System) -> set[int]:

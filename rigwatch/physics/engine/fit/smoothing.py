@@ -13,7 +13,7 @@ The kernel is symmetric and has zero phase; in real time it is delayed by half i
 from math import factorial
 
 import numpy as np
-from scipy.signal import savgol_coeffs, savgol_filter
+import scipy
 
 from rigwatch.wire.arrays import FloatArray
 
@@ -42,9 +42,11 @@ def smoothed(
         for _ in range(order):
             signal = np.gradient(signal, dt)
         return np.asarray(signal, np.float64)
-    found = savgol_filter(signal, fitting, POLYNOMIAL, deriv=order, delta=dt)
+    found = scipy.signal.savgol_filter(signal, fitting, POLYNOMIAL, deriv=order, delta=dt)
     for more in range(1, POLYNOMIAL + 1 - order) if late else ():
-        steeper = savgol_filter(signal, fitting, POLYNOMIAL, deriv=order + more, delta=dt)
+        steeper = scipy.signal.savgol_filter(
+            signal, fitting, POLYNOMIAL, deriv=order + more, delta=dt
+        )
         found = found + steeper * late**more / factorial(more)
     return np.asarray(found)
 
@@ -88,7 +90,7 @@ def _quietest(power: FloatArray) -> float:
 
 def _response(width: int, order: int, frequency: FloatArray) -> FloatArray:
     """Amplitude response of the kernel without its phase of order·90°; in samples."""
-    kernel = savgol_coeffs(width, POLYNOMIAL, deriv=order, use="dot")
+    kernel = scipy.signal.savgol_coeffs(width, POLYNOMIAL, deriv=order, use="dot")
     at = np.arange(width) - width // 2
     turned = np.exp(1j * np.outer(frequency, at)) @ kernel
     return np.asarray((turned / 1j**order).real, np.float64)

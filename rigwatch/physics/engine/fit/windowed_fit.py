@@ -7,7 +7,7 @@ least squares sees only the parameters.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from rigwatch.physics.engine.compile import CompiledSystem, resolved_from
 from rigwatch.physics.engine.equations import System
@@ -186,7 +186,7 @@ def _smallest_error(
         return (own if prior is None else np.vstack([own, prior.slopes])) * unit
 
     try:
-        found = least_squares(
+        found = scipy.optimize.least_squares(
             residuals,
             np.full(len(theta), FAR),
             jac=slopes,

@@ -13,7 +13,7 @@ recording and form a class.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from rigwatch.wire.arrays import FloatArray
 
@@ -100,7 +100,7 @@ def score(
     size = np.sqrt(np.where(seen, energy, 1.0))
     unit = np.where(seen, left / size, 0.0)
     along = unit.T @ r
-    single = chi2.sf(along**2 / variance, 1)
+    single = chdtrc(1, along**2 / variance)
     return Scores(
         along**2 / variance,
         single,

@@ -11,7 +11,7 @@ the candidate leaves of the residual (`noise_spectrum.py`).
 """
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from rigwatch.physics.engine.score.noise_spectrum import NoiseBands, noise_bands, spectra
 from rigwatch.physics.engine.score.score_test import Scores, best_of
@@ -42,7 +42,7 @@ def corrected_p_values(scores: Scores, residual: FloatArray) -> FloatArray:
     for at in range(0, len(along), TOGETHER):
         some = slice(at, at + TOGETHER)
         variance[some] = _variances(bands, own, spectra(units[..., some]), along[some])
-    alone = chi2.sf(along**2 / np.maximum(variance, 1e-300), 1)
+    alone = chdtrc(1, along**2 / np.maximum(variance, 1e-300))
     return best_of(alone, int(np.sum(scores.score > 0)))
 
 

@@ -12,9 +12,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 import sympy
 from scipy.optimize import least_squares, lsq_linear
-from scipy.signal import savgol_filter
 
 from rigwatch.physics.engine.compile import CompiledSystem, derivative, numpy_function
 from rigwatch.physics.engine.equations import TIME, UNTIL, System, symbol
@@ -146,7 +146,9 @@ def _smooth(signal: FloatArray, recording: Recording, width: int, order: int) ->
     for part in recording.slices:
         if part.stop - part.start > 2 * width:
             whole = filled(signal[part])
-            made[part] = savgol_filter(whole, width, 3, deriv=order, delta=recording.dt)
+            made[part] = scipy.signal.savgol_filter(
+                whole, width, 3, deriv=order, delta=recording.dt
+            )
     gaps = np.convolve(~np.isfinite(signal), np.ones(width), "same") > 0.5
     return np.where(gaps, np.nan, made)
 
