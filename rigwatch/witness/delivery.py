@@ -172,8 +172,9 @@ def _apprise_sender(recipient: RecipientSection, rig: str, file: Path) -> Send:
     except ImportError:
         raise MissingExtraError("apprise", "notify", "notification by address") from None
     logging.getLogger("apprise").setLevel(logging.CRITICAL)
-    service = apprise.Apprise()
-    if not service.add(recipient.url):
+    # One service alone is called on this thread. Apprise's own are waited for when a process ends.
+    service = apprise.Apprise.instantiate(recipient.url)
+    if service is None:
         scheme = recipient.url.partition(":")[0]
         found = f"an address {scheme}:… that Apprise cannot use"
         raise ConfigError(
@@ -184,7 +185,7 @@ def _apprise_sender(recipient: RecipientSection, rig: str, file: Path) -> Send:
     def send(notice: Notice) -> bool:
         title, body = text_of(notice, rig)
         kind = kinds.get(notice.alarm.severity, apprise.NotifyType.FAILURE)
-        return bool(service.notify(body, title, kind))
+        return bool(service.notify(body, title=title, notify_type=kind))
 
     return _bounded(send)
 

@@ -25,6 +25,8 @@ from rigwatch.witness.process import Witness
 from tests.waiting import eventually
 from tests.witness.test_people import fault
 
+ROOT = Path(__file__).parents[2]
+
 
 class Webhook(ThreadingHTTPServer):
     """Takes what is posted; answers with `status`."""
@@ -156,6 +158,31 @@ def test_an_address_that_answers_without_end_fails_and_does_not_hold_what_follow
         drip.shutdown()
 
 
+_CHILD = """
+import sys
+from pathlib import Path
+from tests.witness.test_delivery import ALARMS, Bench, fault
+bench = Bench(Path(sys.argv[1]), sys.argv[2])
+bench.monitor.publish(ALARMS, fault("loss"))
+bench.turn()
+input()
+"""
+
+
+def test_a_process_ends_though_an_address_answers_without_end(tmp_path: Path) -> None:
+    with Drip() as drip:
+        url = f"json://127.0.0.1:{drip.server_address[1]}"
+        people = f'[[recipients]]\nname = "hook"\nurl = "{url}"\n'
+        words = [sys.executable, "-c", _CHILD, str(tmp_path), people]
+        with subprocess.Popen(words, cwd=ROOT, stdin=subprocess.PIPE) as child:
+            try:
+                assert drip.asked.wait(30.0)
+                child.communicate(b"\n", timeout=10.0)
+            finally:
+                child.kill()
+        drip.shutdown()
+
+
 class Drip(socketserver.ThreadingTCPServer):
     """A server whose answer has no end."""
 
@@ -163,11 +190,14 @@ class Drip(socketserver.ThreadingTCPServer):
 
     def __init__(self) -> None:
         super().__init__(("127.0.0.1", 0), _Dripping)
+        self.asked = threading.Event()
         threading.Thread(target=self.serve_forever, daemon=True).start()
 
 
 class _Dripping(socketserver.BaseRequestHandler):
     def handle(self) -> None:
+        assert isinstance(self.server, Drip)
+        self.server.asked.set()
         with contextlib.suppress(OSError):
             while True:
                 self.request.sendall(b"H")
