@@ -225,6 +225,8 @@ def test_17_spikes(rig: Field, device: SerialDevice) -> None:
         """Nothing."""
 
     ready(rig, device)
+    # Estimates are zero before a rig is armed.
+    device.source.inject(quiet, 64).sent()
     boot, single = device.device.boot, device.source.inject(spike, 1).sent()
     assert counted(rig, "flagged_spike") == before + 1
     flags = rig.read("position", boot, single - 1, single + 1)[1] & quality.SPIKE
