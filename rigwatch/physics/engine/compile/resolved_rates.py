@@ -3,7 +3,7 @@
 Where friction or a coarse encoder hides a winding's inductance, a fit may lower it without limit:
 R/L grows until the steps of the integration are just stable. A mode there does not decay, so its
 initial state is a free constant of each window, and every simulation takes hundreds of steps a
-sample. A mode that decays within a sixteenth of a sample is instantaneous for any recording.
+sample. A mode that decays within a sixteenth of a sample is instantaneous for most recordings.
 """
 
 from collections.abc import Callable
