@@ -8,13 +8,7 @@ from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.compare.preparation import Bench, open_bench
 from rigwatch.workbench.compare.uncertainty_budget import added_variances
 from rigwatch.workbench.data import METHODS
-from rigwatch.workbench.fit import (
-    Value,
-    as_written,
-    free_run,
-    profile,
-    values,
-)
+from rigwatch.workbench.fit import Value, as_written, free_run, profile, values
 from rigwatch.workbench.study import Held, Study, told, told_unit
 
 

@@ -208,7 +208,7 @@ def study_of(folder: Path, text: str, unsaved: Mapping[str, Unsaved] = NOTHING_U
     written = _written(folder, file, own_files)
     in_si = known_in_si(written, file, folder / FILE)
     known, file = known_of(written, file), told_apart(written, in_si)
-    model, holds = _held(with_shown_units(_by_recording(written, file), file), file)
+    model, holds = _as_studied(written, file)
     study = Study(
         folder,
         file,
@@ -307,7 +307,7 @@ def varied(study: Study, variants: Sequence[str]) -> Study:
     for element in study.elements:
         if f"{element.name}@{element.port}" in named:
             written = with_element(written, element)
-    model, holds = _held(with_shown_units(_by_recording(written, file), file), file)
+    model, holds = _as_studied(written, file)
     model = with_known_values(model, file)
     return replace(study, file=file, model=model, kept=None, holds=holds)
 
@@ -319,9 +319,14 @@ def physics_of(study: Study, name: str) -> str:
     return study.model.variants[name].physics
 
 
-def _by_recording(model: Model, file: StudyFile) -> Model:
-    """The model with what its recordings give, and with what is fitted for each of them."""
-    return fitted_by_recording(known_as_inputs(model, file), file)
+def _as_studied(model: Model, file: StudyFile) -> tuple[Model, dict[str, Held]]:
+    """The model with what its recordings and the study give, and all holds.
+
+    Raises:
+        ModelError: the study names an input or output that the model does not have.
+    """
+    by_recording = fitted_by_recording(known_as_inputs(model, file), file)
+    return _held(with_shown_units(by_recording, file), file)
 
 
 def _held(model: Model, file: StudyFile) -> tuple[Model, dict[str, Held]]:

@@ -15,14 +15,13 @@ from rigwatch.physics.engine.compile.compiled_system import (
 )
 from rigwatch.physics.engine.compile.derivatives import derivative
 from rigwatch.physics.engine.compile.integrator import across, call, lateness, place
-from rigwatch.physics.engine.compile.resolved_rates import FASTEST, resolved, resolved_from
+from rigwatch.physics.engine.compile.resolved_rates import rate_limit, resolved, resolved_from
 from rigwatch.physics.engine.compile.stability import even_substeps
 from rigwatch.physics.engine.compile.static_kernel import evaluated, numpy_function
 from rigwatch.physics.engine.compile.step_size import INSTANT
 from rigwatch.physics.engine.compile.turns import side_by_side, together
 
 __all__ = [
-    "FASTEST",
     "INSTANT",
     "CompiledSystem",
     "Linearisation",
@@ -38,6 +37,7 @@ __all__ = [
     "numpy_function",
     "on_all_cores",
     "place",
+    "rate_limit",
     "resolved",
     "resolved_from",
     "shares",

@@ -13,6 +13,7 @@ import numpy as np
 import sympy
 from msgspec import structs
 
+from rigwatch.physics.engine.compile.compiled_system import CompiledSystem
 from rigwatch.physics.engine.compile.static_kernel import numpy_function
 from rigwatch.physics.engine.compile.step_size import INSTANT, constant_rates, fastest_of
 from rigwatch.physics.engine.equations import Parameter, System
@@ -69,6 +70,17 @@ def resolved_from(system: System, parameters: FloatArray, spacing: float) -> Sys
                     system, bounded[name], name, rate, parameters, spacing, limit
                 )
     return replace(system, parameters=bounded)
+
+
+def rate_limit(compiled: CompiledSystem, parameters: FloatArray, spacing: float) -> float:
+    """The fastest rate that a fit takes from these parameters, which may be beyond `FASTEST` [1/s].
+
+    Args:
+        compiled: the system.
+        parameters: where the fit starts, shape (n_p,).
+        spacing: time between samples [s].
+    """
+    return max(FASTEST / spacing, compiled.fastest(parameters))
 
 
 def _bounded(  # noqa: PLR0917 -- they belong together

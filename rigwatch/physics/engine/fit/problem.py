@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import FASTEST, CompiledSystem, Simulation
+from rigwatch.physics.engine.compile import CompiledSystem, Simulation, rate_limit
 from rigwatch.physics.engine.fit.initial_state_projection import Tangent
 from rigwatch.physics.engine.fit.recorded_effect_states import RecordedEffectStates
 from rigwatch.physics.engine.fit.recording import Recording, cut_for, initial_states, shown_states
@@ -159,8 +159,7 @@ class Problem:
         Those of a model that is faster at these parameters become no faster.
         """
         self.unresolved = False
-        reached = self.compiled.fastest(parameters) * self.recording.dt
-        self._fastest = max(FASTEST, reached)
+        self._fastest = rate_limit(self.compiled, parameters, self.recording.dt)
 
     def hold(self, initial: FloatArray, columns: IntArray) -> None:
         """Set the initial states of windows and fix some of the states."""
@@ -401,7 +400,7 @@ class Problem:
 
         The same where a mode becomes too fast for the recording to resolve.
         """
-        if self.compiled.fastest(parameters) * self.recording.dt > self._fastest:
+        if self.compiled.fastest(parameters) > self._fastest:
             self.unresolved = True
             return np.full(self.count, np.nan)
         before = self.initial

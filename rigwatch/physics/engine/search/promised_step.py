@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import FASTEST
+from rigwatch.physics.engine.compile import rate_limit
 from rigwatch.physics.engine.fit import Fit, Recording, bounds, error_at
 from rigwatch.physics.engine.search.convergence import (
     PROMISED,
@@ -36,11 +36,11 @@ def kept_promise(fitted: Fit, recording: Recording, horizon: int, substeps: int)
         return promised
 
     system = fitted.compiled
-    resolved = max(FASTEST, system.fastest(fitted.parameters) * recording.dt)
+    limit = rate_limit(system, fitted.parameters, recording.dt)
 
     def size(parameters: FloatArray) -> float:
         # A fit goes no further than the recording resolves.
-        if system.fastest(parameters) * recording.dt > resolved:
+        if system.fastest(parameters) > limit:
             return math.inf
         return error_at(system, recording, horizon, parameters, fitted.scale, substeps) ** 2
 

@@ -20,7 +20,7 @@ from functools import partial
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import FASTEST, CompiledSystem
+from rigwatch.physics.engine.compile import CompiledSystem, rate_limit
 from rigwatch.physics.engine.fit import Fit, Recording, error_at, fit
 from rigwatch.physics.engine.search.convergence import PROMISED, spread
 from rigwatch.physics.engine.search.drawn_starts import drawn_start
@@ -128,11 +128,11 @@ class ShortHorizons:
 
     def _drawn(self, begin: FloatArray, generator: np.random.Generator) -> FloatArray:
         """A random start at which the recording resolves the model's modes, if one is found."""
-        compiled, spacing = self.compiled, self.recording.dt
-        resolved = max(FASTEST, compiled.fastest(begin) * spacing)
+        compiled = self.compiled
+        limit = rate_limit(compiled, begin, self.recording.dt)
         for _ in range(DRAWS):
             found = drawn_start(compiled.system, begin, generator)
-            if compiled.fastest(found) * spacing <= resolved:
+            if compiled.fastest(found) <= limit:
                 break
         return found
 
