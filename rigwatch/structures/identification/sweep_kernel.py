@@ -6,7 +6,7 @@ addresses of functions, as in `engine.compile.integrator`.
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import across, call, lateness, place
+from rigwatch.physics.engine.compile import across, call, input_rows, lateness, place
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel
 
@@ -59,7 +59,7 @@ def sweep(  # noqa: C901, PLR0917 -- a kernel
     """Fill outputs y of P, their slopes dy by H, and path = [H | P] at the samples, from s."""
     count, n = nominal.shape
     width, last = s.shape[1], s.shape[1] - 1
-    xs, us, ss = np.empty(n), np.empty(u.shape[1] + 1), np.empty((n, width))
+    xs, us, ss = np.empty(n), input_rows(u, 1)[0], np.empty((n, width))
     z, dz = np.empty(n * (1 + width)), np.empty(n * (1 + width))
     ks, wide, pp = np.zeros((b.size, n, width)), np.empty((y.shape[1], width)), p.ctypes.data
     for k in range(count):
@@ -106,7 +106,8 @@ def slopes_along(  # noqa: PLR0917 -- a kernel
     value: FloatArray, slopes: FloatArray,
 ) -> None:  # fmt: skip
     """Values of equations and their derivatives, at every sample of `nominal`."""
-    us = np.zeros(u.shape[1] + 1)
+    us = input_rows(u, 1)[0]
+    us[u.shape[1]] = 0.0
     for k in range(nominal.shape[0]):
         us[: u.shape[1]] = u[k]
         call(
@@ -122,7 +123,7 @@ def forward(  # noqa: PLR0917 -- a kernel
 ) -> None:  # fmt: skip
     """Advance x by a sample; s becomes its derivative by free parameters and the old state."""
     n, m = s.shape
-    z, us, times = np.zeros(n * (1 + m)), np.empty((3, u.shape[1] + 1)), np.empty(4)
+    z, us, times = np.zeros(n * (1 + m)), input_rows(u, 3), np.empty(4)
     for i in range(n):
         z[i] = x[i]
         z[n + i * m + m - n + i] = 1.0

@@ -17,14 +17,24 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
+from rigwatch.physics.engine.compile.step_size import ACCURATE, STABLE
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.kernel import kernel
 
 _DOUBLE = ir.DoubleType()
 TINY = 1e-200
-"""Magnitude below which a sampled state is set to zero."""
+"""Magnitude below which a state or sensitivity is set to zero."""
 WIDE = 1.5
 """Allowed change of a state in an interval, relative to an Euler step."""
+UNCHANGED = 0.9
+"""Ratio of the least to the greatest slope in an interval in which a contact stays at rest."""
+AT_REST = ACCURATE / STABLE
+"""Steps for a contact at rest, relative to those for one that begins or ends to slip."""
+DAMPED = 2.0
+"""Most rate times step of a memory that a Runge-Kutta step leaves as fast as it is: a third of a
+disturbance is left then, and none at all of one that is as fast as the step allows."""
+DAMPED_BY_HEUN = 1.0
+"""The same for sensitivities along a linearisation."""
 
 
 def _call(  # noqa: PLR0917 -- numba wants them by name
@@ -43,6 +53,14 @@ def _call(  # noqa: PLR0917 -- numba wants them by name
 
 call: Any = intrinsic(_call)
 """call(address, t, a, u, p, out, slopes): arrays are passed by their address."""
+
+
+@kernel(error_model="numpy")
+def input_rows(u: FloatArray, count: int) -> FloatArray:
+    """Rows for inputs, the time until held ones change, and the fastest rate of a memory."""
+    rows = np.empty((count, u.shape[1] + 2))
+    rows[:, u.shape[1] + 1] = math.inf
+    return rows
 
 
 @kernel(error_model="numpy")
@@ -83,6 +101,8 @@ def advance(  # noqa: PLR0917 -- a kernel
     place(u, row, start, middle, hold, rows, dt, us[0])
     place(u, row, middle, middle, hold, rows, dt, us[1])
     place(u, row, end, middle, hold, rows, dt, us[2])
+    for i in range(3):
+        us[i, u.shape[1] + 1] = DAMPED / (dt * (end - start))
     times[0] = (row + start) * dt
     times[1] = (row + middle) * dt
     times[2] = (row + end) * dt
@@ -127,8 +147,15 @@ def renew(  # noqa: PLR0917 -- a kernel
     place(u, row, 0.0, 0.0, hold, rows, dt, us)
     call(update, row * dt, z.ctypes.data, us.ctypes.data, pp, dz.ctypes.data, dz.ctypes.data)
     for i in range(z.size):
-        # Decayed states are set to zero: denormal numbers are slow.
-        z[i] = dz[i] if abs(dz[i]) > TINY else 0.0
+        z[i] = dz[i]
+
+
+@kernel(error_model="numpy")
+def forget(z: FloatArray) -> None:
+    """Set what has decayed to zero: numbers too small to be normal are a hundred times slower."""
+    for i in range(z.size):
+        if abs(z[i]) < TINY:
+            z[i] = 0.0
 
 
 @kernel(error_model="numpy")
@@ -153,10 +180,14 @@ def needed(  # noqa: PLR0917 -- a kernel
     """Number of steps that `pace` requires in the next interval.
 
     Evaluated at its start, at its end after one Euler step, and where the states in `crossing` come
-    closest to zero.
+    closest to zero. Where all three find the same steep slope, the contact is at rest: a mode that
+    only decays, which needs to be stable.
     """
     n, up, ap = dx.size, us.ctypes.data, asked.ctypes.data
+    least, most = np.full(asked.size, math.inf), np.zeros(asked.size)
     place(u, row, 0.0, 0.0, hold, rows, dt, us)
+    # The Euler step carries a memory no further than to where it slips.
+    us[u.shape[1] + 1] = 1.0 / dt
     call(plain, row * dt, z.ctypes.data, up, pp, dx.ctypes.data, dx.ctypes.data)
     for i in range(n):
         near[i] = z[i]
@@ -165,13 +196,16 @@ def needed(  # noqa: PLR0917 -- a kernel
     for i in crossing:
         middle, reach = 0.5 * (z[i] + end[i]), 0.5 * WIDE * abs(end[i] - z[i])
         near[i] = math.copysign(max(abs(middle) - reach, 0.0), middle)
-    worst = 0.0
     for at, share in ((z, 0.0), (near, 0.0), (end, 1.0)):
         if share > 0.0:
             place(u, row, share, share, hold, rows, dt, us)
         call(pace, (row + share) * dt, at.ctypes.data, up, pp, ap, ap)
-        for rate in asked:
-            worst = max(worst, abs(rate))
+        for i in range(asked.size):
+            least[i], most[i] = min(least[i], abs(asked[i])), max(most[i], abs(asked[i]))
+    worst = 0.0
+    for i in range(asked.size):
+        at_rest = i < crossing.size and least[i] > UNCHANGED * most[i]
+        worst = max(worst, most[i] * AT_REST if at_rest else most[i])
     return worst * dt
 
 
@@ -190,8 +224,8 @@ def simulate(  # noqa: PLR0917 -- a kernel
     n, size = x0.shape[1], x0.shape[1] * (1 + m)
     dx, end, near, rate = np.empty(n), np.empty(n), np.empty(n), np.empty(asked)
     z, dz, times = np.empty(size), np.empty(size), np.empty(4)
-    between = np.empty((3, u.shape[1] + 1))
-    us, wanted, late = np.empty(u.shape[1] + 1), y.shape[2], lateness(hold)
+    between, us = input_rows(u, 3), input_rows(u, 1)[0]
+    wanted, late = y.shape[2], lateness(hold)
     pp, out, slopes = p.ctypes.data, np.empty(wanted), np.empty(wanted * m)
     for w in range(starts.size):
         restart(z, x0, w, m)
@@ -218,6 +252,7 @@ def simulate(  # noqa: PLR0917 -- a kernel
                 # Sampled states change together with the held signals.
                 if updated and (row + 1) % rows == 0:
                     renew(update, u, row + 1, hold, rows, dt, pp, z, dz, us)
+                forget(z)
         for i in range(n):
             last[w, i] = z[i]
 
@@ -231,8 +266,9 @@ def linearise(  # noqa: C901, PLR0912, PLR0917 -- a kernel
 ) -> None:  # fmt: skip
     """The trajectory without sensitivities, and the Jacobians at its nodes."""
     n, wide = x0.shape[1], slopes.shape[3]
-    z, times, between = np.empty(n), np.empty(4), np.empty((3, u.shape[1] + 1))
-    us, wanted, pp = np.empty(u.shape[1] + 1), y.shape[2], p.ctypes.data
+    z, times, between = np.empty(n), np.empty(4), input_rows(u, 3)
+    us, wanted, pp = input_rows(u, 1)[0], y.shape[2], p.ctypes.data
+    us[u.shape[1] + 1] = DAMPED_BY_HEUN * substeps / dt
     out, flat = np.empty(max(wanted, n)), np.empty(max(wanted, n) * wide)
     zp, up, op, fp = z.ctypes.data, us.ctypes.data, out.ctypes.data, flat.ctypes.data
     for w in range(starts.size):

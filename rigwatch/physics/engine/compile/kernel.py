@@ -1,7 +1,8 @@
 """The machine code of one system, and its kernel: the equations with the loops of `integrator`.
 
 Functions of a system, each void(double t, double* a, u, p, out, slopes), with n states, m columns
-of sensitivities and q probes; u holds the inputs followed by the time until each changes, if held:
+of sensitivities and q probes; u holds the inputs, the time until each changes, if held, and the
+fastest rate of a memory that the step allows:
 
     rates        a = [x | S], out = [dx/dt | dS/dt]
     step         a = [x | S] or x before and after a step of `rates` or `plain`: `step_function`
@@ -14,10 +15,11 @@ of sensitivities and q probes; u holds the inputs followed by the time until eac
     update_slopes  a = x, out = x after the sample, slopes = ∂ of it, of shape (n, m + q)
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from threading import Lock
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,7 +30,7 @@ from rigwatch.physics.engine.compile.all_cores import on_all_cores, shares
 from rigwatch.physics.engine.compile.derivatives import Differentiated, differentiated
 from rigwatch.physics.engine.compile.llvm import Function, literal, machine_code
 from rigwatch.physics.engine.compile.runge_kutta_step import step_function
-from rigwatch.physics.engine.compile.step_size import Pace, pace
+from rigwatch.physics.engine.compile.step_size import Pace, bounded_memory, pace
 from rigwatch.physics.engine.compile.turns import alone, turn_given
 from rigwatch.physics.engine.equations import TIME, UNTIL, System, symbol
 
@@ -47,6 +49,7 @@ class Equations:
         rates, reads: of the states, and of the outputs.
         pace: rates that determine the step size.
         updates: all states after a sample; none without sampled states.
+        memory: indices of the states that are no faster than a step allows.
     """
 
     states: tuple[str, ...]
@@ -58,6 +61,7 @@ class Equations:
     reads: tuple[sympy.Expr, ...]
     pace: Pace
     updates: tuple[sympy.Expr, ...] = ()
+    memory: tuple[int, ...] = ()
 
 
 class Jacobians(NamedTuple):
@@ -76,6 +80,7 @@ def native_kernel(system: System) -> "NativeKernel":
             tuple(system.states), tuple(system.model.inputs), tuple(system.parameters),
             system.free, system.probes, tuple(system.derivatives.values()),
             tuple(system.outputs.values()), pace(system), _updates(system),
+            tuple(map(list(system.states).index, bounded_memory(system))),
         )
     )  # fmt: skip
 
@@ -118,7 +123,7 @@ class NativeKernel:
             if not all(self._along):
                 address = self._compiled([
                     *self._sensitive(self._columns),
-                    _plain(self._system, "plain", self._rates.values),
+                    self._plain_rates(),
                     _plain(self._system, "pace", self._system.pace.asked),
                     _with_sensitivities(
                         self._system, "update", self._updates, self._columns, behind=True
@@ -149,14 +154,20 @@ class NativeKernel:
                 shares(starts.size) if large else [slice(None)],
             )
 
+    def _plain_rates(self) -> Function:
+        slopes = {i: self._rates.by_state[i][i] for i in self._system.memory}
+        return _plain(self._system, "plain", self._rates.values, slopes)
+
     def _step(self, columns: int) -> str:
         rates = "rates" if columns else "plain"
-        inputs = len(self._system.inputs) + 1
+        inputs = len(self._system.inputs) + 2
         return step_function("step", rates, len(self._system.states), columns, inputs)
 
     def _sensitive(self, columns: int) -> tuple[Function, Function]:
         return (
-            _with_sensitivities(self._system, "rates", self._rates, columns, behind=True),
+            _with_sensitivities(
+                self._system, "rates", self._rates, columns, self._system.memory, behind=True
+            ),
             _with_sensitivities(self._system, "read", self._reads, columns, behind=False),
         )
 
@@ -181,9 +192,9 @@ class NativeKernel:
         """Addresses of the equations without sensitivities, and of their Jacobians."""
         if self._slopes is None:
             address = self._compiled([
-                _plain(self._system, "plain", self._rates.values),
+                self._plain_rates(),
                 _jacobian(self._system, "read_slopes", self._reads),
-                _jacobian(self._system, "rate_slopes", self._rates),
+                _jacobian(self._system, "rate_slopes", self._rates, self._system.memory),
                 _jacobian(self._system, "update_slopes", self._updates),
             ], self._step(0))  # fmt: skip
             self._slopes = Jacobians(
@@ -230,9 +241,19 @@ def _values(function: Function, expressions: Sequence[sympy.Expr]) -> Iterator[s
 
 
 def _with_sensitivities(
-    system: Equations, name: str, found: Differentiated, m: int, *, behind: bool
+    system: Equations,
+    name: str,
+    found: Differentiated,
+    m: int,
+    memory: Sequence[int] = (),
+    *,
+    behind: bool,
 ) -> Function:
-    """Values, and J·S + ∂/∂p in m columns, stored after the values or in `slopes`."""
+    """Values, and J·S + ∂/∂p in m columns, stored after the values or in `slopes`.
+
+    The rates of `memory` are no faster than the step allows, and their rows alike: what they miss
+    is the change of that share, which is small where the memory is near where it slips.
+    """
     function, n, k = _function(system, name), len(system.states), len(found.values)
     if not k:
         return function
@@ -241,38 +262,69 @@ def _with_sensitivities(
     flat = [*found.values, *(e for r in found.by_state for e in r)]
     flat += [e for r in found.by_parameter for e in r]
     values = _values(function, flat)
-    plain = [next(values) for _ in range(k)]
+    plain = [next(values) or literal(0.0) for _ in range(k)]
     by_state = [[next(values) for _ in range(n)] for _ in range(k)]
     explicit = [[next(values) for _ in system.free] for _ in range(k)]
     into, first = ("out", k) if behind else ("slopes", 0)
     moved = [function.load_row("a", n + i * m, m) for i in range(n)]
     for i in range(k):
-        function.store("out", i, plain[i] or literal(0.0))
         row = function.row(explicit[i], m)
         for slope, of_state in zip(by_state[i], moved, strict=True):
             # Most entries of a Jacobian are zero and cost nothing.
             if slope is not None:
                 row = function.add_scaled(row, slope, of_state, m)
+        if i in memory:
+            share = _share(function, system, plain[i], by_state[i][i])
+            plain[i] = function.product(share, plain[i])
+            row = function.add_scaled("zeroinitializer", share, row, m)
+        function.store("out", i, plain[i])
         function.store_row(into, first + i * m, row, m)
     return function
 
 
-def _plain(system: Equations, name: str, expressions: Sequence[sympy.Expr]) -> Function:
-    function = _function(system, name)
-    for index, value in enumerate(list(_values(function, expressions))):
-        function.store("out", index, value or literal(0.0))
+def _share(function: Function, system: Equations, rate: str, slope: str | None) -> str:
+    """Share of a memory's rate that a step allows: 1, or less if it or its slope is faster."""
+    return function.share("u", len(system.inputs) + 1, (rate, slope or literal(0.0)))
+
+
+def _plain(
+    system: Equations,
+    name: str,
+    expressions: Sequence[sympy.Expr],
+    memory: Mapping[int, sympy.Expr] = MappingProxyType({}),
+) -> Function:
+    """Values; those of `memory`, with their slopes by themselves, no faster than a step allows."""
+    function, k = _function(system, name), len(expressions)
+    values = [v or literal(0.0) for v in _values(function, [*expressions, *memory.values()])]
+    slopes = dict(zip(memory, values[k:], strict=True))
+    for index, value in enumerate(values[:k]):
+        kept = value
+        if index in memory:
+            kept = function.product(_share(function, system, value, slopes[index]), value)
+        function.store("out", index, kept)
     return function
 
 
-def _jacobian(system: Equations, name: str, found: Differentiated) -> Function:
-    """Values in `out`; derivatives by free parameters, states and probes in `slopes`."""
+def _jacobian(
+    system: Equations, name: str, found: Differentiated, memory: Sequence[int] = ()
+) -> Function:
+    """Values in `out`; derivatives by free parameters, states and probes in `slopes`.
+
+    Those of `memory` are no faster than the step allows.
+    """
     function, k = _function(system, name), len(found.values)
-    groups = zip(found.by_parameter, found.by_state, found.by_probe, strict=True)
+    groups = list(zip(found.by_parameter, found.by_state, found.by_probe, strict=True))
     flat = [e for group in groups for row in group for e in row]
     values = [value or literal(0.0) for value in _values(function, [*found.values, *flat])]
-    for index, value in enumerate(values):
-        if index < k:
-            function.store("out", index, value)
-        else:
-            function.store("slopes", index - k, value)
+    wide = len(flat) // max(k, 1)
+    for index in range(k):
+        row = values[k + index * wide : k + (index + 1) * wide]
+        whole = [values[index], *row]
+        if index in memory:
+            own = row[len(system.free) + index]
+            share = _share(function, system, values[index], own)
+            whole = [function.product(share, each) for each in whole]
+        function.store("out", index, whole[0])
+        for at, slope in enumerate(whole[1:]):
+            function.store("slopes", index * wide + at, slope)
     return function

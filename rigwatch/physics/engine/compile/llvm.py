@@ -101,6 +101,19 @@ class Function:
         product = self._do(f"fmul {kind} {wide}, {other}")
         return product if row == "zeroinitializer" else self._do(f"fadd {kind} {row}, {product}")
 
+    def product(self, one: str, other: str) -> str:
+        """one·other."""
+        return self._op("fmul", one, other)
+
+    def share(self, array: str, index: int, sizes: Sequence[str]) -> str:
+        """The largest factor up to 1 that takes none of `sizes` beyond an element of an array."""
+        limit = self._do(f"load double, ptr {self._at(array, index)}")
+        first, *rest = (self._call("llvm.fabs.f64", size) for size in sizes)
+        for other in rest:
+            first = self._selected(self._compared("ogt", other, first), other, first)
+        beyond = self._compared("ogt", first, limit)
+        return self._selected(beyond, self._op("fdiv", limit, first), literal(1.0))
+
     def _inserted(self, row: str, value: str, index: int, width: int) -> str:
         return self._do(f"insertelement <{width} x double> {row}, double {value}, i32 {index}")
 

@@ -8,6 +8,10 @@ divided into as many steps as it needs:
     steps per second = max(|∂(dz/dt)/∂z| / 1.0 of effect states,
                            |∂(effect's share of dx/dt)/∂x| / 0.1 of states that cross zero)
 
+The memory of a contact, which is a share of where it slips, asks for them only while it moves: once
+it slips its rate is zero, however fast it would return. So that it stays there in any step, the
+integration leaves no memory faster than a step allows (`bounded_memory`, `integrator.DAMPED`).
+
 A model's own constant rates, such as R/L of a winding, ask for the same. Where a step is just
 stable a mode that should decay at once does not decay at all, so that its initial state becomes a
 free constant of each window, and a fit finds that instead of the parameters.
@@ -31,6 +35,9 @@ ACCURATE = 0.1
 """The same near zero crossings of a state, such as speed, where accuracy needs smaller steps."""
 PASSIVE = 2.0
 """The same for an effect state that is driven by signals and drives nothing itself."""
+CONSTANT = 2.0
+"""The same for one whose rate depends on parameters alone, such as a delay's: it only decays, and
+what it passes on is exact on average, see `DECAY_ERROR`."""
 DECAY_ERROR = 3e-4
 """Largest error of the decay of a model's own mode between two samples, relative to its start: too
 small to be seen as a jump of a fit's error where the number of steps changes. A Runge-Kutta step
@@ -44,6 +51,8 @@ FINEST = 256
 """Most steps between two samples."""
 FILLED = 1
 """Value of an effect state, with both signs, at which its rate is evaluated."""
+SLIPPING = 0.02
+"""Distance of a memory from where it slips below which the steps need not follow its return."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +62,12 @@ class Pace:
     Attributes:
         crossing: indices of model states near whose zero effects are steep.
         asked: expressions whose magnitudes are the required steps per second [1/s].
+        bounded: number of the last of these that ask for a `bounded_memory`.
     """
 
     crossing: tuple[int, ...] = ()
     asked: tuple[sympy.Expr, ...] = ()
+    bounded: int = 0
 
 
 def pace(system: System) -> Pace:
@@ -66,9 +77,33 @@ def pace(system: System) -> Pace:
     steep = _steep(system)
     asked = [slope / ACCURATE for slope in steep.values()]
     allowed = STABLE if system.model.states else PASSIVE
-    asked += [slope / allowed for slope in _of_memory(system)]
+    memory = bounded_memory(system)
+    others = [n for n in system.states if n not in {*system.model.states, *memory}]
+    asked += [
+        slope / (PASSIVE if _is_constant(system, slope) else allowed)
+        for slope in _returns(system, others)
+    ]
+    bounded = [
+        sympy.Min(abs(slope), abs(system.derivatives[name]) / SLIPPING) / allowed
+        for name in memory
+        for slope in _returns(system, [name])
+    ]
     order = list(system.states)
-    return Pace(tuple(order.index(name) for name in steep), tuple(asked))
+    crossing = tuple(order.index(name) for name in steep)
+    return Pace(crossing, (*asked, *bounded), len(bounded))
+
+
+def bounded_memory(system: System) -> tuple[str, ...]:
+    """Effect states without a unit between two bounds, such as the bending of a contact."""
+    return tuple(
+        name
+        for name, state in system.states.items()
+        if name not in system.model.states
+        and state.unit == "1"
+        and math.isfinite(state.low)
+        and math.isfinite(state.high)
+        and symbol(name) in system.derivatives[name].free_symbols
+    )
 
 
 def constant_rates(system: System) -> tuple[sympy.Expr, ...]:
@@ -136,9 +171,14 @@ def _steep(system: System) -> dict[str, sympy.Expr]:
     return found
 
 
-def _of_memory(system: System) -> Sequence[sympy.Expr]:
-    """Derivative of each effect state's rate by that state, at saturation."""
-    memory = [name for name in system.states if name not in system.model.states]
+def _returns(system: System, memory: Sequence[str]) -> Sequence[sympy.Expr]:
+    """Derivative of each of these effect states' rate by that state, at saturation."""
     slopes = [derivative(system.derivatives[name], symbol(name)) for name in memory]
-    sides = [{symbol(name): side for name in memory} for side in (FILLED, -FILLED)]
+    every = [name for name in system.states if name not in system.model.states]
+    sides = [{symbol(name): side for name in every} for side in (FILLED, -FILLED)]
     return list(dict.fromkeys(s.xreplace(full) for s in slopes for full in sides if s != 0))
+
+
+def _is_constant(system: System, slope: sympy.Expr) -> bool:
+    """Whether it depends on parameters alone."""
+    return bool(slope.free_symbols <= {symbol(name) for name in system.parameters})

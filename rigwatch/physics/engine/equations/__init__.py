@@ -7,7 +7,7 @@
 """
 
 from rigwatch.physics.engine.equations.composite import Composite, EffectMap
-from rigwatch.physics.engine.equations.effect import Effect, EffectParameter
+from rigwatch.physics.engine.equations.effect import Effect, EffectParameter, EffectState
 from rigwatch.physics.engine.equations.effect_files import (
     EffectFile,
     library,
@@ -77,6 +77,7 @@ __all__ = [
     "EffectFile",
     "EffectMap",
     "EffectParameter",
+    "EffectState",
     "Hold",
     "Input",
     "Model",

@@ -1,5 +1,6 @@
 """The states of one effect, simulated along the signals at its port."""
 
+import math
 from collections.abc import Mapping
 from functools import lru_cache
 
@@ -11,6 +12,7 @@ from rigwatch.physics.engine.equations import (
     TIME,
     UNTIL,
     Effect,
+    EffectState,
     Hold,
     Input,
     Model,
@@ -55,7 +57,10 @@ class EffectStates:
         wanted = signals if LEFT in used else used
         inputs = [name for name in signals if name not in {TIME, LEFT} and name in wanted]
         self._driving = _side_by_side([signals[name] for name in inputs], signals)
-        equations = tuple((n, s.derivative, s.update) for n, s in effect.states.items())
+        equations = tuple(
+            (name, state.derivative, state.update, *_bounds(state))
+            for name, state in effect.states.items()
+        )
         self._compiled = _alone(equations, tuple(effect.parameters), tuple(inputs), hold, late)
         self._system = self._compiled.system
         self._first = np.array([[state.start for state in effect.states.values()]])
@@ -107,9 +112,14 @@ def _used(effect: Effect) -> set[str]:
     return {name for text in texts for name in names_in(text, "state")}
 
 
+def _bounds(state: EffectState) -> tuple[float, float]:
+    """What bounds a state without a unit, whose steps depend on it."""
+    return (state.low, state.high) if state.unit == "1" else (-math.inf, math.inf)
+
+
 @lru_cache(maxsize=512)
 def _alone(
-    equations: tuple[tuple[str, str, str], ...],
+    equations: tuple[tuple[str, str, str, float, float], ...],
     parameters: tuple[str, ...],
     inputs: tuple[str, ...],
     hold: Hold,
@@ -118,11 +128,11 @@ def _alone(
     """The states of one effect as a system of their own.
 
     Args:
-        equations: name, rate of change and value after each sample of every state.
+        equations: name, rate of change, value after each sample and `_bounds` of every state.
         parameters: of the effect, by name.
         inputs, hold, late: the signals that drive it.
     """
-    states = [name for name, _, _ in equations]
+    states = [name for name, *_ in equations]
     own = (*inputs, TIME, *states, *parameters)
     names = {LEFT: symbol(UNTIL)} | {name: symbol(name) for name in own}
     model = Model(
@@ -133,9 +143,12 @@ def _alone(
         parameters={n: Parameter(value=0.0, unit="1", fixed=True) for n in parameters},
         outputs={name: Output(unit="1", expression=name) for name in states},
     )
-    own_states = {n: State(unit="1", derivative=rate or update) for n, rate, update in equations}
-    rates = {n: parse(rate or "0", names, f"state {n}") for n, rate, _ in equations}
-    updates = {n: parse(update, names, f"state {n}") for n, _, update in equations if update}
+    own_states = {
+        name: State(unit="1", derivative=rate or update, low=low, high=high)
+        for name, rate, update, low, high in equations
+    }
+    rates = {n: parse(rate or "0", names, f"state {n}") for n, rate, *_ in equations}
+    updates = {n: parse(update, names, f"state {n}") for n, _, update, *_ in equations if update}
     read = {name: symbol(name) for name in states}
     return compile_system(
         System(model, (), own_states, model.parameters, rates, read, {}, (), updates)
