@@ -54,7 +54,8 @@ def test_a_step_in_machine_code_is_the_classical_one_bit_for_bit(monkeypatch, in
     size, columns = 2 * (1 + compiled.columns), compiled.columns
     rates, _ = map(as_function, compiled.kernel.with_sensitivities(columns))
     z, p = np.random.default_rng(1).normal(size=size), compiled.parameters
-    us, h = np.array([[0.3, 0.0], [0.4, 0.0], [0.5, 0.0]]), 0.01
+    # The input, the time until it changes, and the fastest rate of a memory.
+    us, h = np.array([[u, 0.0, np.inf] for u in (0.3, 0.4, 0.5)]), 0.01
 
     def slope(t, at, u):
         out = np.zeros(size)

@@ -43,10 +43,14 @@ def placed():
     return found
 
 
-def run(system, substeps, finest):
+TIME = np.arange(SAMPLES) * DT
+SINES = 4 * np.sin(2 * np.pi * 1.3 * TIME) + 3 * np.sin(2 * np.pi * 3.1 * TIME + 1)
+RESTS = 4 * np.sign(np.sin(2 * np.pi * 1.1 * TIME)) + 0.5 * np.sin(2 * np.pi * 0.4 * TIME)
+"""Friction holds the mass until the force changes its sign."""
+
+
+def run(system, substeps, finest, force=SINES):
     compiled = compile_system(system)
-    time = np.arange(SAMPLES) * DT
-    force = 4 * np.sin(2 * np.pi * 1.3 * time) + 3 * np.sin(2 * np.pi * 3.1 * time + 1)
     return compiled.simulate(
         force[:, None], DT, np.zeros(1, np.int64), SAMPLES,
         initial=np.zeros((1, len(system.states))), parameters=compiled.parameters,
@@ -72,6 +76,35 @@ def test_friction_needs_fine_steps_about_standstill_and_gets_them():
     fine = run(system, 256, 1).outputs
     coarse, paced = (run(system, 2, finest).outputs for finest in (1, 256))
     assert np.abs(paced - fine)[..., 0].max() < 0.01 * np.abs(coarse - fine)[..., 0].max()
+
+
+def with_values(name, **values):
+    placement = Placement(name, library()[name].scaled(SIZES), "load")
+    changed = {n: replace(placement.effect.parameters[n], value=v) for n, v in values.items()}
+    return compose(MODEL, [replace_effect(placement, placement.effect.parameters | changed)])
+
+
+@pytest.mark.parametrize("name", ["dahl", "lugre", "jenkins", "bouc_wen"])
+def test_a_contact_stiffer_than_any_step_slips_as_it_does_in_far_finer_steps(name):
+    # Its memory would return in a ten-thousandth of a sample.
+    system = with_values(name, Fc=2.0, s=3e6)
+    # Of the acceleration a sample lies before or after the turn, a hair apart.
+    found, fine = (run(system, *steps).outputs[..., 0] for steps in ((2, 256), (4096, 1)))
+    assert np.sqrt(np.mean((found - fine) ** 2)) <= 1e-3 * fine.std()
+
+
+def test_a_contact_at_rest_is_followed_as_by_steps_that_are_fine_everywhere():
+    system = with_values("coulomb", Fc=3.0)
+    found, fine = (run(system, *steps, RESTS).outputs for steps in ((2, 256), (256, 1)))
+    assert (np.abs(found - fine).max(axis=(0, 1)) <= 1e-4 * fine.std(axis=(0, 1))).all()
+
+
+def test_what_has_decayed_is_zero_and_no_number_too_small_to_be_normal():
+    lag = library()["lag"].scaled(SIZES)
+    fast = replace(lag.parameters["tau"], value=DT / 4)
+    lag = replace(lag, parameters=lag.parameters | {"tau": fast})
+    slopes = np.abs(run(compose(MODEL, [Placement("lag", lag, "drive")]), 2, 256).slopes)
+    assert slopes[slopes > 0].min() > 1e-250
 
 
 def test_a_model_alone_and_one_that_is_not_stiff_ask_for_nothing():

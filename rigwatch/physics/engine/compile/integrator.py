@@ -175,16 +175,19 @@ def restart(z: FloatArray, x0: FloatArray, w: int, m: int) -> None:
 def needed(  # noqa: PLR0917 -- a kernel
     plain: int, pace: int, crossing: IntArray, u: FloatArray, row: int, hold: FloatArray,
     rows: int, dt: float, pp: int, z: FloatArray, dx: FloatArray, end: FloatArray,
-    near: FloatArray, asked: FloatArray, us: FloatArray,
+    near: FloatArray, rates: FloatArray, us: FloatArray,
 ) -> float:  # fmt: skip
     """Number of steps that `pace` requires in the next interval.
 
     Evaluated at its start, at its end after one Euler step, and where the states in `crossing` come
     closest to zero. Where all three find the same steep slope, the contact is at rest: a mode that
-    only decays, which needs to be stable.
+    only decays, which needs to be stable. `rates` is room for what is asked, shape (3, asked).
     """
-    n, up, ap = dx.size, us.ctypes.data, asked.ctypes.data
-    least, most = np.full(asked.size, math.inf), np.zeros(asked.size)
+    n, up = dx.size, us.ctypes.data
+    asked, least, most = rates
+    ap = asked.ctypes.data
+    for i in range(asked.size):
+        least[i], most[i] = math.inf, 0.0
     place(u, row, 0.0, 0.0, hold, rows, dt, us)
     # The Euler step carries a memory no further than to where it slips.
     us[u.shape[1] + 1] = 1.0 / dt
@@ -222,7 +225,7 @@ def simulate(  # noqa: PLR0917 -- a kernel
     `finest` as the `asked` rates of `pace` require.
     """
     n, size = x0.shape[1], x0.shape[1] * (1 + m)
-    dx, end, near, rate = np.empty(n), np.empty(n), np.empty(n), np.empty(asked)
+    dx, end, near, rates = np.empty(n), np.empty(n), np.empty(n), np.empty((3, asked))
     z, dz, times = np.empty(size), np.empty(size), np.empty(4)
     between, us = input_rows(u, 3), input_rows(u, 1)[0]
     wanted, late = y.shape[2], lateness(hold)
@@ -244,7 +247,7 @@ def simulate(  # noqa: PLR0917 -- a kernel
                 steps = substeps
                 if asked > 0 and finest > substeps:
                     wanted_steps = needed(
-                        plain, pace, crossing, u, row, hold, rows, dt, pp, z, dx, end, near, rate,
+                        plain, pace, crossing, u, row, hold, rows, dt, pp, z, dx, end, near, rates,
                         us,
                     )  # fmt: skip
                     steps = int(min(float(finest), max(float(substeps), math.ceil(wanted_steps))))
