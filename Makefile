@@ -11,6 +11,8 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Two workers a core, four at most, as many tests wait for devices and pages.
 WORKERS ?= $(shell cores=$$(nproc 2>/dev/null || echo 2); echo $$((cores < 2 ? 2 : 4)))
 export PATH := $(abspath $(VENV)/bin):$(PATH)
+# Without stored bytecode every process that a test starts compiles its imports anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 # Measured data, where they lie beside the checkout.
 ifeq ($(RIGWATCH_DATA),)
@@ -25,7 +27,7 @@ VIEWER_PACKAGES := mesa-vulkan-drivers libvulkan1
 BROWSER_PACKAGES := chromium chromium-driver
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test sbom vulnerabilities docs demo bench lint unit again nightly demo-headless mutate lock viewer-packages clean
+.PHONY: help setup test sbom vulnerabilities docs demo bench lint tests-read unit again nightly demo-headless mutate lock viewer-packages clean
 
 help:  ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -39,7 +41,7 @@ demo: $(STAMPS)/run  ## simulated rig, monitor and live dashboard: friction appe
 SYNC := $(if $(filter output-sync,$(.FEATURES)),--output-sync=target)
 
 test: $(STAMPS)/dev  ## everything that is checked: style, types, layers, demo, tests
-	@$(MAKE) --no-print-directory -j3 $(SYNC) lint demo-headless viewer-packages
+	@$(MAKE) --no-print-directory -j3 $(SYNC) lint demo-headless viewer-packages tests-read
 	@$(MAKE) --no-print-directory unit
 	@$(MAKE) --no-print-directory sbom
 
@@ -51,6 +53,10 @@ lint: $(STAMPS)/dev  ## ruff, mypy --strict and the rules of which layer imports
 
 demo-headless: $(STAMPS)/run
 	@rigwatch demo --headless
+
+# Once, beside what waits, so that each of the workers finds the bytecode of the tests.
+tests-read: $(STAMPS)/dev
+	@nice pytest --collect-only --quiet --quiet -p no:cacheprovider $(TESTS) >/dev/null || true
 
 unit: $(STAMPS)/dev viewer-packages
 	@if [ "$${CI:-}" = true ] && [ ! -d "$${RIGWATCH_DATA:-}" ]; then \

@@ -1,9 +1,11 @@
 """What holds for all tests: generated cases are judged by their outcome, never by their time."""
 
 import atexit
+import gc
 import os
 import shutil
 import tempfile
+from collections.abc import Generator
 
 import pytest
 from hypothesis import Phase, settings
@@ -22,6 +24,17 @@ settings.register_profile(
     derandomize=True,
 )
 settings.load_profile("rigwatch")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Tests and what they import stay: garbage is looked for only in what is made later."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:

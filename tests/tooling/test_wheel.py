@@ -1,5 +1,6 @@
 """The wheel: every module and data file, and the example configurations that the demo needs."""
 
+import json
 import math
 import os
 import subprocess
@@ -53,13 +54,19 @@ train = [{ session = "run.mcap", end = 2.0 }]
 held_out = [{ session = "run.mcap", start = 2.0 }]
 """
 DO = """
-import sys
-site, *command = sys.argv[1:]
+import contextlib, io, json, sys
+site, commands = sys.argv[1], json.loads(sys.argv[2])
 sys.path.insert(0, site)
 import rigwatch
 assert rigwatch.__file__.startswith(site), rigwatch.__file__
 from rigwatch.commands import main
-sys.exit(main(command))
+told = []
+for command in commands:
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        code = main(command)
+    assert code == 0, (command, code)
+    told.append(out.getvalue())
+print(json.dumps(told))
 """
 
 
@@ -72,30 +79,39 @@ def installed(built: Path) -> Path:
     return site
 
 
-def run(site: Path, folder: Path, *command: str) -> str:
-    """What a command of the installed wheel prints in a folder; Python looks nowhere near."""
+def run(site: Path, folder: Path, *commands: str) -> list[str]:
+    """What commands of the installed wheel print in a folder; Python looks nowhere near."""
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
-    arguments = [sys.executable, "-P", "-c", DO, str(site), *command]
+    words = json.dumps([command.split() for command in commands])
+    arguments = [sys.executable, "-P", "-c", DO, str(site), words]
     done = subprocess.run(
         arguments, cwd=folder, env=environment, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    return done.stdout
+    return list(json.loads(done.stdout))
 
 
 def test_installed_alone_it_finds_what_its_commands_need(installed: Path, tmp_path: Path) -> None:
-    run(installed, tmp_path, "plant", "healthy_sine_8hz_1v5", "--session", "a.mcap",
-        "--seconds", "4")  # fmt: skip
-    assert "most to suspect" in run(installed, tmp_path, "structure", "modes", "shear_frame")
     speeds = [math.sin(0.06 * i + 0.002 * i * (i % 3)) for i in range(400)]
     rows = (f"{i / 100},{v},{3 * v + math.copysign(2, v)}" for i, v in enumerate(speeds))
     (tmp_path / "run.csv").write_text("t,v,f\n" + "\n".join(rows) + "\n")
-    run(installed, tmp_path, "import", "run.csv", "run.mcap", "--time", "t[s]",
-        "--map", "v=v[m/s]", "--map", "f=f[N]")  # fmt: skip
     (tmp_path / "line.toml").write_text(LINE)
     (tmp_path / "own.toml").write_text(STUDY)
-    run(installed, tmp_path, "study", "new", "own", "--template", "own.toml")
-    assert "held out" in run(installed, tmp_path, "compare", "own")
-    assert "coulomb" in run(installed, tmp_path, "explain", "own", "--json")
-    assert "files copied" in run(installed, tmp_path, "init", "mine")
+
+    _, modes, _, _, compared, explained, copied = run(
+        installed,
+        tmp_path,
+        "plant healthy_sine_8hz_1v5 --session a.mcap --seconds 4",
+        "structure modes shear_frame",
+        "import run.csv run.mcap --time t[s] --map v=v[m/s] --map f=f[N]",
+        "study new own --template own.toml",
+        "compare own",
+        "explain own --json",
+        "init mine",
+    )
+
+    assert "most to suspect" in modes
+    assert "held out" in compared
+    assert "coulomb" in explained
+    assert "files copied" in copied
     assert (tmp_path / "mine" / "configs" / "demo.toml").is_file()

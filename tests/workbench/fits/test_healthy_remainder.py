@@ -1,5 +1,6 @@
 """A black box along the measured motion learns what a healthy rig does, and no period of it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +10,15 @@ from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.measured_motion import along_measured_motion
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import compose
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.compare.preparation import open_bench
+from rigwatch.workbench.compare.preparation import bench_of, determined_by_healthy, open_bench
+from rigwatch.workbench.data.motion import along_motion
+from rigwatch.workbench.data.signals import Data, prepare
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.fit import term_selection
 from rigwatch.workbench.fit.learned_terms import LEARNED, with_friction, with_products
+from rigwatch.workbench.study.study import Study
 from tests.workbench.black_box import TEMPLATE, study
 from tests.workbench.black_box import record as multisine
 
@@ -30,27 +35,40 @@ def record(folder: Path, name: str, noise: int, phases: int, **effects: float) -
     multisine(folder, name, noise, phases, period=1000 + phases, **effects)
 
 
+@pytest.fixture(scope="module")
+def taught(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Data, FloatArray | None]:
+    """What the healthy recording teaches, which is the same beside every other one."""
+    opened = recorded(tmp_path_factory.mktemp("taught"))
+    return determined_by_healthy(opened, prepare(opened))
+
+
+def recorded(folder: Path, **effects: float) -> Study:
+    """A healthy rig, and one with effects under an excitation that was not learned."""
+    record(folder, "healthy", 1, phases=1)
+    record(folder, "rig", 2, phases=2, **effects)
+    return study(folder)
+
+
 def test_what_is_learned_holds_under_an_excitation_that_was_not_learned(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    taught: tuple[Study, Data, FloatArray | None],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    record(tmp_path, "healthy", 1, phases=1)
-    record(tmp_path, "rig", 2, phases=2)
-    opened = study(tmp_path)
-    taught = open_bench(opened)
+    found = bench_of(*taught)
     monkeypatch.setattr(term_selection, "TERMS", {})
-    bare = open_bench(opened)
-    assert taught.floor.rms[0] < bare.floor.rms[0]
-    assert taught.base.held_out_error < bare.base.held_out_error
-    assert ranking(taught)[1].word != "missing_effect"
+    bare = open_bench(recorded(tmp_path))
+    assert found.floor.rms[0] < bare.floor.rms[0]
+    assert found.base.held_out_error < bare.base.held_out_error
+    assert ranking(found)[1].word != "missing_effect"
 
 
 def test_friction_is_named_in_newtons_under_an_excitation_that_was_not_learned(
-    tmp_path: Path,
+    tmp_path: Path, taught: tuple[Study, Data, FloatArray | None]
 ) -> None:
-    record(tmp_path, "healthy", 1, phases=1)
-    record(tmp_path, "rig", 2, phases=2, coulomb=0.5)
-    bench = open_bench(study(tmp_path))
-    rows, verdict = ranking(bench)
+    opened = recorded(tmp_path, coulomb=0.5)
+    _, driven = along_motion(opened, prepare(opened))
+    of, data, scale = taught
+    rows, verdict = ranking(bench_of(of, replace(driven, horizon=data.horizon), scale))
     assert verdict.word == "missing_effect"
     best = next(row for row in rows if row.label == "coulomb@load")
     assert best.label in verdict.members

@@ -52,7 +52,7 @@ def test_one_of_three_hidden_effects_is_named_with_another(three, rows):
     assert set(found.beside) == LABELS - set(found.members)
 
 
-def test_without_the_truth_among_them_no_effect_is_named_with_confidence(three, rows):
+def test_without_the_truth_among_them_no_effect_is_named_with_confidence(three):
     known = {"quadratic_drag", "dead_band", "lag", "delay", "digital_smoothing", "moving_average"}
     rest = {n: e for n, e in three.study.effects.items() if n not in known}
     study = dataclasses.replace(three.study, effects=rest)
