@@ -45,7 +45,7 @@ class Image:
 
     def run(self, *words: str) -> str:
         command = [*self.inside, *words]
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=1200)
         assert done.returncode == 0, f"{words}: {done.stdout}{done.stderr}"
         return done.stdout
 

@@ -83,7 +83,7 @@ def test_beyond_loopback_the_endpoint_asks_for_a_certificate(tmp_path: Path) -> 
     endpoint.close()
 
 
-class _Switch(BaseHTTPRequestHandler):
+class Switch(BaseHTTPRequestHandler):
     hits: list[str]
 
     def do_GET(self) -> None:
@@ -97,7 +97,7 @@ class _Switch(BaseHTTPRequestHandler):
 
 def test_the_ping_comes_while_estimates_do() -> None:
     hits: list[str] = []
-    server = HTTPServer(("127.0.0.1", 0), type("Switch", (_Switch,), {"hits": hits}))
+    server = HTTPServer(("127.0.0.1", 0), type("Switch", (Switch,), {"hits": hits}))
     threading.Thread(target=server.serve_forever, daemon=True).start()
     network = MemoryNetwork()
     monitor, url = network.bus("r", "monitor"), f"http://127.0.0.1:{server.server_port}/rig"
