@@ -7,7 +7,7 @@ import zlib
 from collections.abc import Callable
 from typing import Any
 
-import lz4.frame
+import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
 import zstandard
 
@@ -179,13 +179,13 @@ def _messages(depth: int, many: int) -> list[Bomb]:
     def within() -> bytes:
         data = b""
         for _ in range(min(depth, 3000)):
-            data = b"\x3a" + _varint(len(data)) + data
+            data = b"\x32" + _varint(len(data) + 1) + data
         return data
 
     return [
-        ("messages in messages", within),
+        ("messages in messages that promise more", within),
         ("a field of 10^18 bytes", lambda: b"\x0a" + _varint(HUGE)),
-        ("many empty columns", lambda: b"\x3a\x00" * many),
+        ("many empty columns", lambda: b"\x32\x00" * many),
         ("groups without end", lambda: b"\x0b" * depth),
         ("a number without end", lambda: b"\x08" + b"\xff" * many),
     ]

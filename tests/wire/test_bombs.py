@@ -19,6 +19,7 @@ from rigwatch.wire.exchange.mapping import ImportMapping, parse_source
 from rigwatch.wire.exchange.mat5 import MatError, read_mat5
 from rigwatch.wire.exchange.table_files import MOST_COLUMNS, read_table
 from rigwatch.wire.session import open_session
+from rigwatch.wire.session.chunk_reader import MOST_OTHERS
 from rigwatch.wire.session.chunks import MAGIC
 from rigwatch.wire.typed_files import parse
 from tests.exchange.test_exchange_import import made, simple
@@ -62,12 +63,20 @@ def test_a_session_whose_chunk_unpacks_to_much_is_refused(tmp_path: Path) -> Non
 
 
 MALFORMED = {
+    "many records of no kind": record(0, b"") * (MOST_OTHERS + 1),
     "a message without a head": record(5, b"abc"),
     "a schema that breaks off": record(3, b"\x01\x00\xff"),
     "a channel that breaks off": record(4, b"\x01\x00\x01\x00\xff\xff\xff\xff"),
     "a schema whose name is no text": record(3, b"\x01\x00\x02\x00\x00\x00\xff\xfe"),
     "a length beyond the chunk": struct.pack("<BQ", 5, 1 << 60),
 }
+
+
+def test_many_packed_records_of_no_kind_are_refused_at_the_first_of_them(tmp_path: Path) -> None:
+    path = tmp_path / "bomb.mcap"
+    path.write_bytes(MAGIC + chunk(bytes(64 << 20)) * 3 + MAGIC)
+    with pytest.raises(SessionError, match=f"more than {MOST_OTHERS} records"):
+        list(open_session(path).samples())
 
 
 @pytest.mark.parametrize("records", MALFORMED.values(), ids=MALFORMED)
