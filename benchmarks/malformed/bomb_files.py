@@ -11,6 +11,7 @@ import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
 import zstandard
 
+from rigwatch.wire.bus import MAX_PAYLOAD
 from rigwatch.wire.session.chunks import MAGIC
 
 Bomb = tuple[str, Callable[[], bytes]]
@@ -37,7 +38,7 @@ def bombs(chance: random.Random, session: bytes) -> dict[str, list[Bomb]]:
         "csv": _tables(size // 16, many, depth),
         "parquet": _columns(size // 8, depth // 4),
         "toml": _settings(depth, many // 4),
-        "protobuf": _messages(depth, many // 20),
+        "protobuf": _messages(depth, MAX_PAYLOAD // 2),
     }
 
 

@@ -25,8 +25,6 @@ from tools.benchmark_table import Row
 
 SEED = 11
 LONGEST_S, MOST_MB = 5.0, 300.0
-LONGEST_TEXT = 2000
-"""Characters of a refusal."""
 PATIENCE_S = 300.0
 FORK = multiprocessing.get_context("fork")
 Found = tuple[str, float, float]
@@ -94,7 +92,7 @@ def _tell(pipe: "multiprocessing.connection.Connection", kind: str, path: Path) 
         READERS[kind](path)
         text = "(read)"
     except RigwatchError as error:
-        text = str(error) if len(str(error)) < LONGEST_TEXT else f"({len(str(error))} characters)"
+        text = str(error)
     except BaseException as error:
         text = f"({type(error).__name__}: {error})"
     pipe.send((text[:200], time.process_time() - began, _peak_mb() - base))

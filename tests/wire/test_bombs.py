@@ -14,10 +14,13 @@ import zstandard
 from scipy.io import savemat
 
 from rigwatch.commands import main
-from rigwatch.wire.errors import ImportDataError, SessionError
+from rigwatch.wire.bus import MAX_PAYLOAD
+from rigwatch.wire.errors import ImportDataError, MessageError, SessionError
 from rigwatch.wire.exchange.mapping import ImportMapping, parse_source
 from rigwatch.wire.exchange.mat5 import MatError, read_mat5
 from rigwatch.wire.exchange.table_files import MOST_COLUMNS, read_table
+from rigwatch.wire.messages import EstimateBlock, SampleBlock, decode
+from rigwatch.wire.messages.packed import decode_block
 from rigwatch.wire.session import open_session
 from rigwatch.wire.session.chunk_reader import MOST_OTHERS
 from rigwatch.wire.session.chunks import MAGIC
@@ -146,6 +149,18 @@ def test_an_error_that_quotes_a_long_name_is_cut(tmp_path: Path) -> None:
     with pytest.raises(ImportDataError, match="found no column") as error:
         made(tmp_path, f"t,{'a' * 100_000}\n0,1\n1,2\n2,3\n", simple())
     assert len(str(error.value)) < 5000
+
+
+@pytest.mark.parametrize(("kind", "field"), [(SampleBlock, 6), (EstimateBlock, 5)])
+def test_a_message_of_empty_columns_is_refused_before_they_are_made(
+    kind: type[SampleBlock | EstimateBlock], field: int
+) -> None:
+    bomb = bytes([field << 3 | 2, 0]) * (MAX_PAYLOAD // 2)
+    for reads in (decode, decode_block):
+        began = time.process_time()
+        with pytest.raises(MessageError, match="131072 columns, expected at most 4096"):
+            reads(kind, bomb)
+        assert time.process_time() - began < 0.5
 
 
 def test_a_cell_without_end_is_named(tmp_path: Path) -> None:
