@@ -28,6 +28,7 @@ from rigwatch.wire.typed_files import find_config, parse
 from tools.benchmark_table import Row
 
 LONGEST_S = 2.0
+SESSION_SAMPLES = 256
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def _targets(folder: Path) -> dict[str, Target]:
     return {
         "frames of a device": Target(lambda d: FrameDecoder().feed(d), _frames()),
         "messages of the bus": Target(_decode_all, _messages()),
-        "sessions": Target(lambda d: _read_session(session, d), (_session(folder),)),
+        "sessions": Target(lambda d: _read_session(session, d), (intact_session(folder),)),
         **{name: Target(*one) for name, one in import_readers(folder).items()},
         "configuration": Target(
             lambda d: parse(d.decode(errors="replace"), RigConfig, "fuzzed.toml"),
@@ -117,10 +118,11 @@ def _decode_all(data: bytes) -> None:
             continue
 
 
-def _session(folder: Path) -> bytes:
+def intact_session(folder: Path) -> bytes:
+    """The bytes of a short session."""
     path = folder / "intact.mcap"
     with SessionWriter(path, run_info("bench", 256.0, t_ns=1), sync=False) as writer:
-        for first in range(0, 256, 32):
+        for first in range(0, SESSION_SAMPLES, 32):
             writer.write(_block(first))
             writer.flush()
     return path.read_bytes()

@@ -75,9 +75,10 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "link",
         "critical",
-        "the connection to the device is lost (cable, power or port)",
-        "Check the cable and the device's power. The connection is restored by itself; lost "
-        "samples are counted.",
+        "nothing connects the monitor with the device any more",
+        "The reason names what is away. The device: check its power, the cable and the port. The "
+        "router or data acquisition: check that it runs (`rigwatch doctor CONFIG`). The connection "
+        "is restored by itself; lost samples are counted.",
         _AT_ONCE,
     ),
     AlarmKind(

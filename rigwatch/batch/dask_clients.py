@@ -5,7 +5,8 @@ The file is for dask-jobqueue, which submits workers to a batch system as jobs.
 
 import logging
 import threading
-from collections.abc import Iterator
+import warnings
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -63,8 +64,11 @@ class ClusterFile(Section, frozen=True):
 def _client_class(purpose: str) -> Any:
     try:
         from distributed import Client
+        from distributed.versions import VersionMismatchWarning
     except ImportError:
         raise MissingExtraError("distributed", "dask", purpose) from None
+    # A table of all packages; what matters of it is checked.
+    warnings.simplefilter("ignore", VersionMismatchWarning)
     # What it logs about a lost connection is said in one line by this program.
     logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)
     return Client
@@ -159,9 +163,11 @@ def _connected(client: Any, where: str) -> Any:
 
 
 def _check_workers(client: Any, where: str, wait: float) -> None:
-    """Raise if no worker comes, or one cannot load this version of rigwatch."""
+    """Raise if no worker comes, or one cannot load this version of rigwatch or of Dask."""
     try:
+        _check_dask(client.get_versions(), where)
         client.wait_for_workers(1, timeout=wait)
+        _check_dask(client.get_versions(), where)  # of the workers that have come since
         found = client.run(_version, on_error="return")
     except TimeoutError:
         raise BatchError(f"{where}: the scheduler has no worker, expected at least one") from None
@@ -172,6 +178,16 @@ def _check_workers(client: Any, where: str, wait: float) -> None:
             raise BatchError(
                 f"{where}: worker {worker} has rigwatch {version}, expected {__version__}"
             )
+
+
+def _check_dask(found: Mapping[str, Any], where: str) -> None:
+    """Raise if scheduler or a worker has another Dask than this process: they may half work."""
+    own = found["client"]["packages"]["distributed"]
+    workers = {f"worker {name}": of for name, of in sorted(found["workers"].items())}
+    for name, of in {"the scheduler": found["scheduler"], **workers}.items():
+        its = of["packages"]["distributed"]
+        if its != own:
+            raise BatchError(f"{where}: {name} has Dask {its}, expected {own} as here")
 
 
 def _version() -> str:

@@ -8,6 +8,7 @@ importing a module of this package that draws.
 """
 
 import importlib.util
+from pathlib import Path
 
 from rigwatch.wire.errors import MissingExtraError
 
@@ -20,3 +21,12 @@ def require_rerun() -> None:
     """
     if importlib.util.find_spec("rerun") is None:
         raise MissingExtraError("rerun-sdk", "dashboard", "the dashboard")
+
+
+def viewer_program() -> Path | None:
+    """The viewer's executable, None if its package lacks it; a Python launcher would survive it."""
+    found = importlib.util.find_spec("rerun_cli")
+    if found is None or found.origin is None:
+        return None
+    program = Path(found.origin).with_name("rerun")
+    return program if program.is_file() else None

@@ -2,11 +2,10 @@
 
 import importlib.util
 import os
-import shutil
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from rigwatch.dashboard import viewer_program
 from rigwatch.doctor.finding import Finding, judged
 
 
@@ -16,7 +15,7 @@ def check_viewer() -> Iterator[Finding]:
         remedy = "pip install 'rigwatch[dashboard]'"
         yield Finding("viewer", "warn", "rerun is not installed: no dashboard", remedy)
         return
-    program = shutil.which("rerun", path=f"{Path(sys.executable).parent}:{os.environ['PATH']}")
+    program = viewer_program()
     remedy = "pip install --force-reinstall rerun-sdk"
     yield judged("viewer", program is not None, f"rerun: {program or 'no program'}", remedy, "warn")
     yield check_display()

@@ -27,8 +27,18 @@ from pathlib import Path
 _KNOWN = {errno.ENOSPC: "no space left on the disk", errno.EROFS: "the disk is read-only"}
 
 
+LONGEST_TEXT, END_TEXT = 4000, 400
+"""Characters of an error's text, and of them those at its end: a file may hold long names."""
+
+
 class RigwatchError(Exception):
     """Base of all errors whose message is one plain line for the user."""
+
+    def __str__(self) -> str:
+        text = super().__str__()
+        if len(text) <= LONGEST_TEXT:
+            return text
+        return f"{text[: LONGEST_TEXT - END_TEXT]} … {text[-END_TEXT:]}"
 
 
 def one_line(error: BaseException) -> str:

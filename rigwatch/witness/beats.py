@@ -3,15 +3,20 @@
 Another watchdog raises an alarm when they stop, whatever ended: monitor, witness or the machine.
 """
 
+import http.client
 import threading
+import urllib.error
 import urllib.request
 from pathlib import Path
 
 from rigwatch.wire.errors import ConfigError, reason_of
 from rigwatch.wire.host import replace_file
+from rigwatch.witness.bounded import Bounded
 
 TIMEOUT = 5.0
-"""Longest wait for the answer to a ping [s]."""
+"""Longest wait for each part of the answer to a ping [s]."""
+WHOLE = 10.0
+"""Longest ping [s]."""
 
 
 def write_beat(path: Path, rig: str, t_ns: int) -> str:
@@ -36,6 +41,8 @@ class Pinger:
 
     Attributes:
         sent, failed: number of pings answered with success, and of others.
+        trouble: why the last one failed, in one line without the address, which may be a secret; ""
+            if it did not.
 
     Raises:
         ConfigError: the URL is of another kind.
@@ -46,6 +53,8 @@ class Pinger:
             kind = url.partition(":")[0]
             raise ConfigError("configuration", "witness.heartbeat_url", kind, "http:// or https://")
         self.sent = self.failed = 0
+        self.trouble = ""
+        self._bounded = Bounded("ping")
         self._url, self._interval = url, interval
         self._due_at = float("-inf")
         self._wanted = threading.Event()
@@ -60,14 +69,35 @@ class Pinger:
     def _run(self) -> None:
         while self._wanted.wait():
             self._wanted.clear()
-            if self._ping():
-                self.sent += 1
-            else:
+            why = self._ping()
+            self.trouble = why and f"heartbeat_url cannot be reached: {why}"
+            if why:
                 self.failed += 1
+            else:
+                self.sent += 1
 
-    def _ping(self) -> bool:
+    def _ping(self) -> str:
+        """Ping; returns why it failed, "" if it did not."""
+        found = ["no answer"]
         try:
-            with urllib.request.urlopen(self._url, timeout=TIMEOUT) as answer:
-                return 200 <= int(answer.status) < 300
-        except (OSError, ValueError):
-            return False
+            self._bounded.call(lambda: found.append(_asked(self._url)), WHOLE)
+        except TimeoutError as error:
+            return str(error)
+        return found[-1]
+
+
+def _asked(url: str) -> str:
+    """Why a URL does not answer with success; "" if it does."""
+    try:
+        with urllib.request.urlopen(url, timeout=TIMEOUT):
+            return ""
+    except urllib.error.HTTPError as error:
+        return f"the server answers {error.code}"
+    except urllib.error.URLError as error:
+        return reason_of(error.reason) if isinstance(error.reason, OSError) else str(error.reason)
+    except (ValueError, http.client.InvalidURL):
+        return "the address is not valid"
+    except http.client.HTTPException:
+        return "the answer is not HTTP"
+    except OSError as error:
+        return reason_of(error)

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from rigwatch.wire.errors import ConfigError, MissingExtraError
 from rigwatch.wire.messages import json_fields
+from rigwatch.witness.bounded import Bounded
 from rigwatch.witness.notices import Notice
 from rigwatch.witness.people import PeopleFile, RecipientSection
 
@@ -29,8 +30,6 @@ COMMAND_S = 60.0
 """Longest run of a command [s]."""
 ADDRESS_S = 30.0
 """Longest attempt to reach an address: a server may answer a byte at a time for ever [s]."""
-MOST_HUNG = 4
-"""Attempts at an address that may hang at the same time; further ones fail at once."""
 Send = Callable[[Notice], bool]
 
 
@@ -191,24 +190,17 @@ def _apprise_sender(recipient: RecipientSection, rig: str, file: Path) -> Send:
 
 
 def _bounded(send: Send) -> Send:
-    """The same, ended after a while; a thread that hangs cannot be ended, only left behind."""
-    hung: list[threading.Thread] = []
+    """The same, ended after a while."""
+    bounded = Bounded("notify")
 
     def within(notice: Notice) -> bool:
-        hung[:] = [thread for thread in hung if thread.is_alive()]
-        if len(hung) >= MOST_HUNG:
-            return False
         reached: list[bool] = []
 
         def attempt() -> None:
             with contextlib.suppress(Exception):  # as the plugins of Apprise raise
                 reached.append(send(notice))
 
-        thread = threading.Thread(target=attempt, name="notify", daemon=True)
-        thread.start()
-        thread.join(ADDRESS_S)
-        if thread.is_alive():
-            hung.append(thread)
+        bounded.call(attempt, ADDRESS_S)
         return bool(reached and reached[0])
 
     return within

@@ -19,7 +19,6 @@ class Outputs:
 
     Attributes:
         figures: what the endpoint serves.
-        trouble: why an output is not renewed, in one line; "" for nothing.
 
     Raises:
         ConfigError: an output is invalid.
@@ -28,13 +27,18 @@ class Outputs:
 
     def __init__(self, settings: WitnessSection, bus: Bus, security: SecuritySection) -> None:
         self.figures = Figures(bus.rig)
-        self.trouble = ""
+        self._file_trouble = ""
         self._file = Path(settings.heartbeat_file) if settings.heartbeat_file else None
         url, seconds = settings.heartbeat_url, settings.heartbeat_seconds
         self._pinger = Pinger(url, seconds) if url else None
         metrics = settings.metrics
         self._endpoint = Endpoint(metrics, self.figures, security) if metrics else None
         self._healths = bus.subscribe(HEALTH) if metrics else None
+
+    @property
+    def trouble(self) -> str:
+        """Why an output is not renewed, in one line; "" for nothing."""
+        return self._file_trouble or (self._pinger.trouble if self._pinger else "")
 
     @property
     def counters(self) -> dict[str, float]:
@@ -56,7 +60,7 @@ class Outputs:
         for health in self._healths.drain() if self._healths else ():
             self.figures.take_health(health, now)
         if not stale and self._file:
-            self.trouble = write_beat(self._file, self.figures.rig, t_ns)
+            self._file_trouble = write_beat(self._file, self.figures.rig, t_ns)
         if not stale and self._pinger:
             self._pinger.beat(now)
 

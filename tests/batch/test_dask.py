@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from distributed import versions
 
 import rigwatch
 from rigwatch.batch import executor_on
@@ -81,6 +82,19 @@ def test_a_command_runs_on_the_cluster(cluster, tmp_path, capsys):
     assert main([*words, "--results", str(tmp_path / "dask.jsonl"), "--on", cluster.address]) == 0
     assert "dry_friction" in capsys.readouterr().out
     assert (tmp_path / "dask.jsonl").read_bytes() == (tmp_path / "here.jsonl").read_bytes()
+
+
+def test_a_scheduler_of_another_version_is_one_sentence(cluster, monkeypatch, recwarn):
+    real = versions.version("distributed")
+    of_this_process = versions.get_package_info
+    monkeypatch.setattr(
+        versions, "get_package_info", lambda names: of_this_process(names) | {"distributed": "1.2"}
+    )
+    with pytest.raises(BatchError) as told, executor_on(cluster.address):
+        pass
+    expected = f"the scheduler has Dask {real}, expected 1.2 as here"
+    assert str(told.value) == f"{cluster.address}: {expected}"
+    assert not recwarn.list
 
 
 def test_a_cluster_declared_in_a_file_runs_its_workers_as_jobs(files, tmp_path, monkeypatch):

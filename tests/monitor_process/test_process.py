@@ -202,7 +202,11 @@ def test_a_router_that_is_away_is_named_as_the_reason(bench: Bench) -> None:
 
     assert wait_until(named, PATIENCE)
     standing = {one.name: one for one in bench.monitor.rig.alarms.standing()}
-    assert standing["link"].cause.endswith("the router does not answer")
+    link = standing["link"]
+    assert link.cause.endswith(": the router does not answer")
+    # What does not depend on the reason accuses no cable.
+    assert "cable" not in link.cause
+    assert "router" in link.guidance
 
 
 def test_commands_are_obeyed_and_refusals_explained(bench: Bench) -> None:

@@ -12,6 +12,7 @@ import yaml
 from rigwatch.commands import COMMANDS, main
 from rigwatch.supervisor.plan import PROCESSES
 from rigwatch.wire.rig_config import load_rig
+from tools.image.collect import NUMBER, STATE
 
 ROOT = Path(__file__).parents[2]
 DOCKER = ROOT / "docker"
@@ -62,10 +63,19 @@ def test_the_image_runs_as_a_user_without_rights_and_says_what_it_can_do() -> No
 
 def test_base_images_are_named_to_the_last_digit_and_run_a_supported_python() -> None:
     bases = [rest.split()[0] for head, rest in instructions() if head == "FROM"]
-    assert len(bases) == 2, "what builds must not be in what runs"
-    for base in bases:
-        version = re.fullmatch(r"python:(3)\.(1[123])\.\d+-slim-\w+", base)
-        assert version, base
+    build, run = bases
+    assert re.fullmatch(r"python:3\.1[123]\.\d+-slim-\w+", build)
+    assert run == "scratch", "what builds must not be in what runs, a shell least of all"
+
+
+def test_what_runs_is_what_was_collected_and_its_state_belongs_to_its_user() -> None:
+    last = instructions()[[head for head, _ in instructions()].index("FROM", 1) :]
+    assert "RUN" not in [head for head, _ in last], "there is no shell to run it with"
+    copied = [rest for head, rest in last if head == "COPY"]
+    state = f"--from=build --chown={NUMBER}:{NUMBER} /state {STATE}"
+    assert copied == ["--from=build /image /", state]
+    environment = dict(re.findall(r"(\w+)=(\S+)", dict(last)["ENV"]))
+    assert environment["PATH"] == "/opt/rigwatch/bin"
 
 
 def test_only_locked_packages_get_into_the_image() -> None:

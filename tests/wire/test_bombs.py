@@ -14,11 +14,15 @@ import zstandard
 from scipy.io import savemat
 
 from rigwatch.commands import main
-from rigwatch.wire.errors import ImportDataError, SessionError
+from rigwatch.wire.bus import MAX_PAYLOAD
+from rigwatch.wire.errors import ImportDataError, MessageError, SessionError
 from rigwatch.wire.exchange.mapping import ImportMapping, parse_source
 from rigwatch.wire.exchange.mat5 import MatError, read_mat5
-from rigwatch.wire.exchange.table_files import read_table
+from rigwatch.wire.exchange.table_files import MOST_COLUMNS, read_table
+from rigwatch.wire.messages import EstimateBlock, SampleBlock, decode
+from rigwatch.wire.messages.packed import decode_block
 from rigwatch.wire.session import open_session
+from rigwatch.wire.session.chunk_reader import MOST_OTHERS
 from rigwatch.wire.session.chunks import MAGIC
 from rigwatch.wire.typed_files import parse
 from tests.exchange.test_exchange_import import made, simple
@@ -28,15 +32,15 @@ MEMORY = 300 << 20
 MAT_HEAD = b"MATLAB 5.0".ljust(124) + b"\x00\x01IM"
 
 
-def peak_of(refused: type[Exception], call: object, *arguments: object) -> str:
-    """The refusal, after at most 10 s of processor time and 300 MB."""
+def peak_of(refused: type[Exception], call: object, *arguments: object, most: int = MEMORY) -> str:
+    """The refusal, after at most 5 s of processor time and 300 MB."""
     tracemalloc.start()
     began = time.process_time()
     try:
         with pytest.raises(refused) as error:
             call(*arguments)  # type: ignore[operator]
-        assert time.process_time() - began < 10.0
-        assert tracemalloc.get_traced_memory()[1] < MEMORY
+        assert time.process_time() - began < 5.0
+        assert tracemalloc.get_traced_memory()[1] < most
     finally:
         tracemalloc.stop()
     return str(error.value)
@@ -62,12 +66,20 @@ def test_a_session_whose_chunk_unpacks_to_much_is_refused(tmp_path: Path) -> Non
 
 
 MALFORMED = {
+    "many records of no kind": record(0, b"") * (MOST_OTHERS + 1),
     "a message without a head": record(5, b"abc"),
     "a schema that breaks off": record(3, b"\x01\x00\xff"),
     "a channel that breaks off": record(4, b"\x01\x00\x01\x00\xff\xff\xff\xff"),
     "a schema whose name is no text": record(3, b"\x01\x00\x02\x00\x00\x00\xff\xfe"),
     "a length beyond the chunk": struct.pack("<BQ", 5, 1 << 60),
 }
+
+
+def test_many_packed_records_of_no_kind_are_refused_at_the_first_of_them(tmp_path: Path) -> None:
+    path = tmp_path / "bomb.mcap"
+    path.write_bytes(MAGIC + chunk(bytes(64 << 20)) * 3 + MAGIC)
+    with pytest.raises(SessionError, match=f"more than {MOST_OTHERS} records"):
+        list(open_session(path).samples())
 
 
 @pytest.mark.parametrize("records", MALFORMED.values(), ids=MALFORMED)
@@ -80,10 +92,15 @@ def test_records_malformed_under_a_right_checksum_are_one_line(
     assert "Traceback" not in capsys.readouterr().err
 
 
-def test_a_mat_file_that_unpacks_to_much_is_refused() -> None:
-    packed = zlib.compress(bytes(1 << 28), 1)
+@pytest.mark.parametrize(
+    ("promised", "told"), [(1 << 28, "unpacks to more than"), (8, "longer than it says")]
+)
+def test_a_mat_file_that_unpacks_to_much_is_refused_for_its_first_bytes(
+    promised: int, told: str
+) -> None:
+    packed = zlib.compress(struct.pack("<II", 14, promised) + bytes(1 << 28), 1)
     bomb = MAT_HEAD + struct.pack("<II", 15, len(packed)) + packed
-    assert "unpacks to more than" in peak_of(MatError, read_mat5, bomb)
+    assert told in peak_of(MatError, read_mat5, bomb, most=8 << 20)
 
 
 def test_a_mat_file_of_many_small_parts_is_refused() -> None:
@@ -111,6 +128,39 @@ def test_a_parquet_file_that_unpacks_to_much_is_refused(tmp_path: Path) -> None:
     parquet.write_table(table, path, compression="zstd")
     del table
     assert "unpacks to more than" in peak_of(ImportDataError, read_table, path, ImportMapping())
+
+
+def test_parquet_texts_that_unpack_to_much_are_refused_and_so_are_too_many_columns(
+    tmp_path: Path,
+) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    path, text = tmp_path / "bomb.parquet", "a" * (40 << 20)
+    parquet.write_table(pyarrow.table({"t": [0.0], "u": [text]}), path, compression="zstd")
+    assert "unpacks to more than" in peak_of(ImportDataError, read_table, path, ImportMapping())
+    columns = {f"c{number}": [0.0] for number in range(MOST_COLUMNS + 1)}
+    parquet.write_table(pyarrow.table(columns), path)
+    found = f"{MOST_COLUMNS + 1} columns, expected at most {MOST_COLUMNS}"
+    assert found in peak_of(ImportDataError, read_table, path, ImportMapping())
+
+
+def test_an_error_that_quotes_a_long_name_is_cut(tmp_path: Path) -> None:
+    with pytest.raises(ImportDataError, match="found no column") as error:
+        made(tmp_path, f"t,{'a' * 100_000}\n0,1\n1,2\n2,3\n", simple())
+    assert len(str(error.value)) < 5000
+
+
+@pytest.mark.parametrize(("kind", "field"), [(SampleBlock, 6), (EstimateBlock, 5)])
+def test_a_message_of_empty_columns_is_refused_before_they_are_made(
+    kind: type[SampleBlock | EstimateBlock], field: int
+) -> None:
+    bomb = bytes([field << 3 | 2, 0]) * (MAX_PAYLOAD // 2)
+    for reads in (decode, decode_block):
+        began = time.process_time()
+        with pytest.raises(MessageError, match="131072 columns, expected at most 4096"):
+            reads(kind, bomb)
+        assert time.process_time() - began < 0.5
 
 
 def test_a_cell_without_end_is_named(tmp_path: Path) -> None:

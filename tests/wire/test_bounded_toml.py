@@ -24,6 +24,7 @@ BOMBS = {
     "a dotted header": "[" + " . ".join(["a"] * 50_000) + "]",
     "a hexadecimal number": f"a = 0x{'f' * 100_000}",
     "much text": 'text = "' + "x" * (1 << 24) + '"',
+    "many tables": "[[a]]\n" * 1_000_000,
     "quotes": '"' * 100_000,
     "backslashes": 'text = "' + "\\" * 100_001,
 }

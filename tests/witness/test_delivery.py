@@ -184,11 +184,12 @@ def test_a_process_ends_though_an_address_answers_without_end(tmp_path: Path) ->
 
 
 class Drip(socketserver.ThreadingTCPServer):
-    """A server whose answer has no end."""
+    """A server that answers with the same bytes again and again, without end."""
 
     daemon_threads = True
 
-    def __init__(self) -> None:
+    def __init__(self, answer: bytes = b"H") -> None:
+        self.answer = answer
         super().__init__(("127.0.0.1", 0), _Dripping)
         self.asked = threading.Event()
         threading.Thread(target=self.serve_forever, daemon=True).start()
@@ -200,7 +201,7 @@ class _Dripping(socketserver.BaseRequestHandler):
         self.server.asked.set()
         with contextlib.suppress(OSError):
             while True:
-                self.request.sendall(b"H")
+                self.request.sendall(self.server.answer)
                 time.sleep(0.05)
 
 

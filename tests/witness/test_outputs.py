@@ -15,11 +15,13 @@ from rigwatch.wire.errors import ConfigError, RigwatchError
 from rigwatch.wire.host import free_port
 from rigwatch.wire.messages import ALARMS, ESTIMATES, HEALTH, EstimateBlock, Health
 from rigwatch.wire.rig_config import SecuritySection, WitnessSection
+from rigwatch.witness import beats
 from rigwatch.witness.beats import Pinger
 from rigwatch.witness.metrics import MOST_SOURCES, Endpoint, Figures
 from rigwatch.witness.process import Witness
 from tests.access.secured_rig import make_keys
 from tests.waiting import eventually
+from tests.witness.test_delivery import Drip
 from tests.witness.test_people import fault
 
 
@@ -81,7 +83,7 @@ def test_beyond_loopback_the_endpoint_asks_for_a_certificate(tmp_path: Path) -> 
     endpoint.close()
 
 
-class _Switch(BaseHTTPRequestHandler):
+class Switch(BaseHTTPRequestHandler):
     hits: list[str]
 
     def do_GET(self) -> None:
@@ -95,7 +97,7 @@ class _Switch(BaseHTTPRequestHandler):
 
 def test_the_ping_comes_while_estimates_do() -> None:
     hits: list[str] = []
-    server = HTTPServer(("127.0.0.1", 0), type("Switch", (_Switch,), {"hits": hits}))
+    server = HTTPServer(("127.0.0.1", 0), type("Switch", (Switch,), {"hits": hits}))
     threading.Thread(target=server.serve_forever, daemon=True).start()
     network = MemoryNetwork()
     monitor, url = network.bus("r", "monitor"), f"http://127.0.0.1:{server.server_port}/rig"
@@ -118,8 +120,24 @@ def test_a_ping_that_fails_is_counted_and_waits_nowhere() -> None:
     pinger = Pinger(f"http://127.0.0.1:{free_port()}", 1.0)
     pinger.beat(0.0)
     eventually(lambda: pinger.failed == 1, "the failure")
+    assert pinger.trouble == "heartbeat_url cannot be reached: connection refused"
     with pytest.raises(ConfigError, match="http:// or https://"):
         Pinger("file:///etc/passwd", 1.0)
+
+
+@pytest.mark.parametrize("answer", [b"what do you want?\r\n\r\n", b"H"])
+def test_a_server_that_does_not_speak_http_or_never_ends_is_told_and_does_not_end_the_pings(
+    answer: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(beats, "WHOLE", 0.2)
+    with Drip(answer) as drip:
+        pinger = Pinger(f"http://127.0.0.1:{drip.server_address[1]}/secret", 1.0)
+        for count in (1, 2):
+            pinger.beat(float(count))
+            eventually(lambda wanted=count: pinger.failed == wanted, "the failure")
+        drip.shutdown()
+    told = "no end of the answer within 0.2 s" if answer == b"H" else "the answer is not HTTP"
+    assert pinger.trouble == f"heartbeat_url cannot be reached: {told}"
 
 
 def test_a_heartbeat_file_that_cannot_be_written_is_told_until_it_can(tmp_path: Path) -> None:

@@ -52,7 +52,7 @@ VERDICTS: dict[str, tuple[str, Colour]] = {
     "dry_friction": ("DRY FRICTION", _ALARM),
     "stiction": ("STICTION", (200, 40, 110)),
     "other_fault": ("OTHER FAULT", (190, 70, 30)),
-    "link": ("NO DEVICE", (120, 60, 150)),
+    "link": ("NOT CONNECTED", (120, 60, 150)),
     "stale": ("NO SAMPLES", (120, 60, 150)),
     "fault": ("FAULT", (200, 80, 60)),
 }

@@ -4,7 +4,6 @@ It listens on 127.0.0.1 only, drops its oldest data at a memory limit, ends with
 started it, and neither reports usage nor fetches examples from the network.
 """
 
-import importlib.util
 import os
 import shutil
 import socket
@@ -16,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Literal, Self
 
+from rigwatch.dashboard import viewer_program
 from rigwatch.dashboard.viewer.viewer_page import HOST, Page
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.host import end_process, free_ports, last_line
@@ -170,11 +170,9 @@ def answers(port: int) -> bool:
 
 
 def _binary() -> Path:
-    """The viewer's executable; its Python launcher would survive the viewer."""
-    found = importlib.util.find_spec("rerun_cli")
-    if found is None or found.origin is None:
+    if (program := viewer_program()) is None:
         raise ViewerError("the package rerun-sdk is incomplete: its viewer is missing")
-    return Path(found.origin).with_name("rerun")
+    return program
 
 
 def _environment() -> dict[str, str]:

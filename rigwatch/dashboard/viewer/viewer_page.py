@@ -4,6 +4,7 @@ As shipped, the page reports usage, asks for updates and loads fonts and example
 with no switch for that. The rule is a Content-Security-Policy, which browsers enforce.
 """
 
+import http.client
 import threading
 import urllib.error
 import urllib.parse
@@ -62,6 +63,7 @@ def policy(data_port: int) -> str:
 
 
 class _Handler(BaseHTTPRequestHandler):
+    timeout = _TIMEOUT
     source = ""
     rule = ""
     start = "/"
@@ -71,6 +73,10 @@ class _Handler(BaseHTTPRequestHandler):
         if self.path == "/":
             self._send_to_start()
             return
+        if not self.path.startswith("/"):
+            # It would become part of the viewer's address.
+            self.send_error(400, "not a path")
+            return
         request = urllib.request.Request(self.source + self.path)
         request.add_header("Accept-Encoding", self.headers.get("Accept-Encoding", ""))
         try:
@@ -78,7 +84,9 @@ class _Handler(BaseHTTPRequestHandler):
                 self._reply(answer.status, answer.headers, answer.read())
         except urllib.error.HTTPError as error:
             self._reply(error.code, error.headers, error.read())
-        except OSError:
+        except (ValueError, http.client.InvalidURL):
+            self.send_error(400, "not a path")
+        except (OSError, http.client.HTTPException):
             self.send_error(502, "the viewer does not answer")
 
     def _send_to_start(self) -> None:

@@ -98,10 +98,14 @@ def _unpacked(element: _Element, order: str, budget: Budget) -> _Element:
     if element.kind != _COMPRESSED:
         return element
     unpacker = zlib.decompressobj()
-    data = unpacker.decompress(element.data, budget.left + 1)
-    budget.take(len(data))
+    head = unpacker.decompress(element.data, 8)
+    kind, size = struct.unpack(f"{order}II", head)
+    # Four bytes or less lie in the head itself. What the head promises is charged before it is had.
+    size = 0 if kind >> 16 else size
+    budget.take(size)
+    data = head + unpacker.decompress(unpacker.unconsumed_tail, size + 8)
     if not unpacker.eof:
-        raise ValueError("a compressed variable is truncated")
+        raise ValueError("a compressed variable is truncated, or longer than it says")
     return next(_elements(memoryview(data), order))
 
 

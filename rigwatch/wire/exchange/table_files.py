@@ -19,6 +19,8 @@ FORMATS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".dat": "csv"} | {
     ".parquet": "parquet",
     ".json": "json",
 }
+MOST_COLUMNS = 4096
+"""Columns of a Parquet file: their descriptions alone take memory."""
 
 
 def read_table(path: Path, mapping: ImportMapping) -> Table:
@@ -96,15 +98,23 @@ def _read_parquet(path: Path, _: ImportMapping) -> Table:
     import pyarrow
 
     try:
-        rows, columns = parquet.read_metadata(path).num_rows, parquet.read_schema(path).names
-        Budget(path.stat().st_size).take(8 * rows * len(columns))
-        found = parquet.read_table(path)
+        with parquet.ParquetFile(path) as file:
+            Budget(path.stat().st_size).take(_unpacked_bytes(file.metadata))
+            found = file.read()
     except (pyarrow.ArrowException, ValueError) as error:
         reason = str(error).splitlines()[0]
         raise ImportDataError(f"{path}: not a readable Parquet file: {reason}") from error
     return Table(
         path, {name: found[name].to_numpy(zero_copy_only=False) for name in found.column_names}
     )
+
+
+def _unpacked_bytes(found: Any) -> int:
+    """Memory that a Parquet file asks for: its columns unpacked, or the arrays made of them."""
+    if found.num_columns > MOST_COLUMNS:
+        raise ValueError(f"{found.num_columns} columns, expected at most {MOST_COLUMNS}")
+    unpacked = sum(int(found.row_group(n).total_byte_size) for n in range(found.num_row_groups))
+    return max(unpacked, 8 * int(found.num_rows) * int(found.num_columns))
 
 
 _READERS: dict[str, Callable[[Path, ImportMapping], Table]] = {

@@ -20,6 +20,8 @@ from rigwatch.wire.messages.protobuf_schema import (
 )
 
 M = TypeVar("M", bound=Message)
+MOST_COLUMNS = 4096
+"""Columns of a block."""
 
 
 def _to_wire(hint: Any) -> Callable[[Any], Any]:
@@ -88,13 +90,22 @@ def decode(kind: type[M], data: bytes) -> M:
         MessageError: the bytes are not such a message, or its columns differ in length.
     """
     try:
-        message: M = _read(kind, proto_class(kind.__name__).FromString(data))
+        found = proto_class(kind.__name__).FromString(data)
+        _check_columns(found)
+        message: M = _read(kind, found)
     except (DecodeError, MessageError) as error:
         raise MessageError(
             f"{kind.__name__}: {len(data)} bytes cannot be decoded: {error}"
         ) from error
     _check_lengths(message)
     return message
+
+
+def _check_columns(found: Any) -> None:
+    """Raise if there are more columns than a rig has: empty ones take two bytes each."""
+    count = max(len(getattr(found, name, ())) for name in ("channels", "columns"))
+    if count > MOST_COLUMNS:
+        raise MessageError(f"{count} columns, expected at most {MOST_COLUMNS}")
 
 
 def _check_lengths(message: Message) -> None:

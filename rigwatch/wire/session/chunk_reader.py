@@ -20,6 +20,9 @@ _SCHEMA, _CHANNEL, _MESSAGE = 0x03, 0x04, 0x05
 _BY_NUMBER = dict(enumerate(TOPICS, start=1))
 _BY_NAMES = {(line.name, schema.type_name(line.message)): line for line in TOPICS}
 
+MOST_OTHERS = 10_000
+"""Records of a file's chunks that are neither messages nor declarations."""
+
 
 class ChunkReader:
     """Splits the records of intact chunks into messages, with the channels declared so far.
@@ -32,6 +35,7 @@ class ChunkReader:
         self._path, self._foreign = path, foreign
         self._schemas: dict[int, str] = {}
         self._lines: dict[int, Topic | None] = {}
+        self._others = 0
 
     def messages(self, records: bytes) -> Iterator[tuple[Topic, int, bytes]]:
         """Topic, time and bytes of each message.
@@ -58,7 +62,15 @@ class ChunkReader:
                 self._schemas |= _read_schema(records[at : at + length])
             elif opcode == _CHANNEL:
                 self._declare(records[at : at + length])
+            else:
+                self._pass_over()
             at += length
+
+    def _pass_over(self) -> None:
+        """Pass over a record of another kind; packed, millions of empty ones are a small file."""
+        self._others += 1
+        if self._others > MOST_OTHERS:
+            raise ValueError(f"more than {MOST_OTHERS} records of kinds that no session has")
 
     def _line(self, number: int) -> Topic | None:
         return self._lines[number] if number in self._lines else _BY_NUMBER.get(number)

@@ -8,7 +8,7 @@ import re
 import tomllib
 from typing import Any
 
-LARGEST_TEXT = 1 << 24
+LARGEST_TEXT = 1 << 22
 """Largest length of a TOML text [characters]."""
 DEEPEST = 32
 """Largest nesting depth of tables and arrays, and number of parts of a dotted key."""

@@ -1,0 +1,40 @@
+"""Calls what may hang, for a limited time: a server may answer a byte at a time for ever."""
+
+import threading
+from collections.abc import Callable
+
+MOST_HUNG = 4
+"""Calls that may hang at the same time; further ones fail at once."""
+
+
+class Bounded:
+    """Calls one kind of work, each time in a thread of its own.
+
+    A thread that hangs cannot be ended. It is left behind, and does not keep the process alive.
+
+    Args:
+        name: of the threads.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._hung: list[threading.Thread] = []
+
+    def call(self, work: Callable[[], None], longest: float) -> None:
+        """Call `work` and wait for it.
+
+        Args:
+            longest: time for it [s].
+
+        Raises:
+            TimeoutError: it has not returned in time, or too many calls before it have not yet.
+        """
+        self._hung = [thread for thread in self._hung if thread.is_alive()]
+        if len(self._hung) >= MOST_HUNG:
+            raise TimeoutError(f"{MOST_HUNG} earlier calls have not returned")
+        thread = threading.Thread(target=work, name=self._name, daemon=True)
+        thread.start()
+        thread.join(longest)
+        if thread.is_alive():
+            self._hung.append(thread)
+            raise TimeoutError(f"no end of the answer within {longest:g} s")
