@@ -55,13 +55,13 @@ def test_an_input_is_not_late_once_the_slow_sensor_is_in_the_model(tmp_path):
 
 def test_steps_are_held_though_the_model_is_far_off():
     def recording(seed: int) -> Recording:
-        table = run(seed, 20)
+        table = run(seed, 40)
         return Recording(1.0, table["power"][:, None], table["warmer"][:, None])
 
     span = (Span(session="simulated"),)
     file = StudyFile(model="block.toml", train=span, held_out=span)
     study = Study(Path(), file, parse_model(BLOCK, Path("block.toml")), library(), frozenset())
-    data = Data(recording(1), recording(2), None, 60, ())
+    data = Data(recording(1), recording(2), None, 40, ())
     assert with_hold(study, data).model.held("power") == "zero"
 
 
