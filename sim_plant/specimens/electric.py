@@ -16,6 +16,8 @@ RESISTANCE, INDUCTANCE = 1.2, 0.06
 """[ohm], [H]."""
 BATTERY, INNER = 18.0, 0.5
 """Supply of a chopper: [V], [ohm]."""
+LIMIT, GIVES_WAY = 3.0, 0.15
+"""A drive gives less voltage above a current [A], the less the more flows beyond it [V/A^2]."""
 
 
 def volts(time: FloatArray, seed: int) -> FloatArray:
@@ -49,6 +51,8 @@ def conduct(inputs: FloatArray, dt: float, hidden: str) -> FloatArray:
             if hidden == "supply_sag":
                 share = volt / BATTERY
                 volt = share * (BATTERY - INNER * share * current)
+            if hidden == "current_limit" and abs(current) > LIMIT:
+                volt -= math.copysign(GIVES_WAY * (abs(current) - LIMIT) ** 2, current)
             flux += h * (volt - RESISTANCE * copper * current - brushes - induced)
     return read
 

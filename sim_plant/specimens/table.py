@@ -32,6 +32,7 @@ HIDDEN: dict[str, Specimen] = {
         (_WINDING, {
             "back_emf": ("back_emf@drive",),
             "supply_sag": ("supply_sag@drive",),
+            "current_limit": ("current_limit@drive",),
             "brush_drop": ("brush_drop@contact",),
             "resistance_by_temperature": ("resistance_by_temperature@contact",),
             "saturating_inductance": ("saturating_inductance@iron",),

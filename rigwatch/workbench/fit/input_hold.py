@@ -8,6 +8,9 @@ requires an error that falls, over blocks, by more than chance, on held-out reco
 any, and in training: recordings that contradict each other show another defect of the model.
 
 A healthy recording is used if available, as a fault cannot be mistaken for a hold there.
+
+Inputs that are seen to be held, as their steps start and end at rest, are not taken as lines,
+however far off the model is: a line through a step begins half a sample before the step.
 """
 
 from collections.abc import Mapping
@@ -36,6 +39,10 @@ DELAYS = (0.25, 0.5, 0.75, 1.0)
 """Delays tried before the best is refined, as shares of a sample."""
 FINE = 5e-4
 """Resolution of the delay, as a share of a sample."""
+STEP = 0.05
+"""Least change of an input that counts as a step, over its range."""
+STEPPED = 0.9
+"""Share of the squared changes of an input in steps from rest to rest, from which it is held."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,11 +112,34 @@ def _chosen(
     start = parameters_of(study.file) if placements else dict(study.file.start)
     line = try_one("linear", 0.0, start, None)
     kept = try_one("zero", 0.0, line.fitted.train.values(), line.fitted)
-    best = kept if _better(kept, line) else line
+    best = kept if _seen_held(study, data) or _better(kept, line) else line
     if data.along_motion or _at_noise(best, data, scale):
         return best, line
     late = _refined(partial(try_one, "zero"), kept)
     return (late if late is not None and _better(late, best) else best), line
+
+
+def _seen_held(study: Study, data: Data) -> bool:
+    """Whether all inputs without a hold that change are seen to be held."""
+    unheld, train = set(study.model.unheld()), data.train
+    own = [at for at, name in enumerate(study.model.inputs) if name in unheld]
+    changing = [at for at in own if np.ptp(train.inputs[:, at]) > 0]
+    return bool(changing) and all(
+        any(stepped(train.inputs[part, at]) for part in train.slices) for at in changing
+    )
+
+
+def stepped(signal: FloatArray) -> bool:
+    """Whether a signal changes in steps from rest to rest, so that it is held between samples.
+
+    Args:
+        signal: of one recording, shape (samples,).
+    """
+    change = np.diff(signal)
+    moves = np.concatenate([[False], change != 0.0, [False]])
+    alone = moves[1:-1] & ~moves[:-2] & ~moves[2:] & (np.abs(change) > STEP * np.ptp(signal))
+    total = float(np.sum(np.square(change)))
+    return total > 0.0 and float(np.sum(np.square(change[alone]))) >= STEPPED * total
 
 
 def _tried(  # noqa: PLR0917 -- they belong together

@@ -16,9 +16,9 @@ from msgspec import structs
 
 from rigwatch.physics.engine.score import suits
 from rigwatch.wire.errors import ModelError, nearest
-from rigwatch.workbench.compare import Bench, Comparison, Warm, with_horizon_of
+from rigwatch.workbench.compare import Bench, Comparison, Warm
 from rigwatch.workbench.explain import SetGain, set_gain
-from rigwatch.workbench.fit import error_text, held_as
+from rigwatch.workbench.fit import error_text
 from rigwatch.workbench.ranking import (
     Progress,
     Ranked,
@@ -28,13 +28,12 @@ from rigwatch.workbench.ranking import (
     refit_nested,
     shapes_of,
 )
+from rigwatch.workbench.steps.kept_holds import with_kept_holds
 from rigwatch.workbench.study import (
     Accepted,
     Study,
-    append_effect,
     commit,
     drop_effect,
-    keep_holds,
     stands_on,
     use_variants,
 )
@@ -130,10 +129,8 @@ def try_add(
     if not (supported or anyway):
         return _refused(study, row, before, f"{_falls(row, before, found)}: {row.reason}")
     accepted = whole(row)
-    # Hold and horizon are kept, so that errors before and after refer to the same inputs.
-    held = with_horizon_of(held_as(study, bench.study.holds), bench.study)
-    changed = append_effect(keep_holds(held), accepted)
     progress(f"refitting with {row.label}")
+    changed = with_kept_holds(study, accepted, bench, warm)
     after = warm.comparison(changed)
     again = after.held_out_error
     if supported and not keeps_gain(before.held_out_error, found, again, after.noise_floor):
