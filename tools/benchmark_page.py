@@ -42,6 +42,7 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
             "latency",
             "notification",
             "random_kills",
+            "a_year",
             "rogue_client",
             "fuzzing",
             "replay",
