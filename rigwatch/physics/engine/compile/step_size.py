@@ -84,7 +84,7 @@ def pace(system: System) -> Pace:
         for slope in _returns(system, others)
     ]
     bounded = [
-        sympy.Min(abs(slope), abs(system.derivatives[name]) / SLIPPING) / allowed
+        sympy.Min(abs(slope), abs(system.derivatives[name]) / SLIPPING, evaluate=False) / allowed
         for name in memory
         for slope in _returns(system, [name])
     ]
