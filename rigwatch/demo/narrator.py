@@ -49,14 +49,15 @@ class Narrator:
     Args:
         scenario: the changes to the rig.
         say: called with each line.
+        acknowledge: the command by which a person says that an alarm was seen.
 
     Attributes:
         alarms: raised so far.
     """
 
-    def __init__(self, scenario: Scenario, say: Callable[[str], None]) -> None:
+    def __init__(self, scenario: Scenario, say: Callable[[str], None], acknowledge: str) -> None:
         self.alarms: list[Alarm] = []
-        self._say = say
+        self._say, self._acknowledge = say, acknowledge
         self._rate = scenario.plant.sample_rate
         self._acts = acts(scenario)
         self._next = next(self._acts, None)
@@ -107,7 +108,15 @@ class Narrator:
         if self._ended is not None:
             name = self._ended.name.replace("_", " ")
             self._say(f"{self._time(self._ended.seq)} {name}: the condition has gone")
+            self._tell_how_to_acknowledge(self._ended)
             self._ended = None
+
+    def _tell_how_to_acknowledge(self, ended: Alarm) -> None:
+        """Say once that an alarm stands until somebody has seen it, and the command for that."""
+        if ended.state == "cleared_unacknowledged" and self._acknowledge:
+            self._say("            the alarm stands until somebody acknowledges it:")
+            self._say(f"              $ {self._acknowledge} {ended.name}")
+            self._acknowledge = ""
 
     def _delay(self, alarm: Alarm) -> str:
         if self._last is None or alarm.seq < self._last.seq:

@@ -58,7 +58,8 @@ class Show:
         self._rig, self._folder, self._say = rig, folder, say
         self._config = load_rig(rig)
         assert self._config.plant is not None
-        self._narrator = Narrator(load_scenario(self._config.plant.scenario), say)
+        scenario = load_scenario(self._config.plant.scenario)
+        self._narrator = Narrator(scenario, say, f"rigwatch ack {relative(self._rig)}")
         self._first = self._seen = 0
         self._up: subprocess.Popen[str] | None = None
 

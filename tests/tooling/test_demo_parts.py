@@ -104,9 +104,26 @@ def test_acts_follow_the_scenario_through_its_cycles() -> None:
     assert rest[len(scenario.events) - 2].seq == first.seq + round(scenario.cycle_s * RATE)
 
 
+def narrator_to(said: list[str]) -> Narrator:
+    scenario = load_scenario(find_config("scenarios/demo.toml"))
+    return Narrator(scenario, said.append, "rigwatch ack rig.toml")
+
+
+def test_how_an_alarm_that_has_gone_is_acknowledged_is_told_once() -> None:
+    said: list[str] = []
+    narrator = narrator_to(said)
+    for seq in (5200, 9200):
+        narrator.alarm(alarm("dry_friction", seq))
+        narrator.alarm(alarm("dry_friction", seq + 500, "cleared_unacknowledged"))
+    assert [line.strip() for line in said if "ack" in line] == [
+        "the alarm stands until somebody acknowledges it:",
+        "$ rigwatch ack rig.toml dry_friction",
+    ]
+
+
 def test_an_alarm_is_reported_with_its_cause_and_its_delay_after_what_was_done() -> None:
     said: list[str] = []
-    narrator = Narrator(load_scenario(find_config("scenarios/demo.toml")), said.append)
+    narrator = narrator_to(said)
     narrator.samples(100)
     assert said == []
     begins = next(acts(load_scenario(find_config("scenarios/demo.toml")))).seq
@@ -121,7 +138,7 @@ def test_an_alarm_is_reported_with_its_cause_and_its_delay_after_what_was_done()
 
 def test_the_wait_for_the_next_fault_is_told_at_the_start_and_after_each_one() -> None:
     said: list[str] = []
-    narrator = Narrator(load_scenario(find_config("scenarios/demo.toml")), said.append)
+    narrator = narrator_to(said)
     narrator.announce(5 * RATE)
     assert "the next fault comes in 15 s; Ctrl-C ends the demo" in said[-1]
     narrator.samples(40 * RATE)
@@ -134,7 +151,7 @@ def test_the_wait_for_the_next_fault_is_told_at_the_start_and_after_each_one() -
 
 def test_a_departure_that_gets_a_name_has_not_gone() -> None:
     said: list[str] = []
-    narrator = Narrator(load_scenario(find_config("scenarios/demo.toml")), said.append)
+    narrator = narrator_to(said)
     narrator.alarm(alarm("departure", 5200))
     narrator.alarm(alarm("departure", 5210, "normal"))
     narrator.samples(7000)
