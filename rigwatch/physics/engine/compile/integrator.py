@@ -31,8 +31,8 @@ UNCHANGED = 0.9
 AT_REST = ACCURATE / STABLE
 """Steps for a contact at rest, relative to those for one that begins or ends to slip."""
 DAMPED = 2.0
-"""Most rate times step of a memory that a Runge-Kutta step leaves as fast as it is: a third of a
-disturbance is left then, and none at all of one that is as fast as the step allows."""
+"""Rate times step beyond which a memory is slowed down: a Runge-Kutta step then leaves a third of a
+disturbance, however fast the memory would return."""
 DAMPED_BY_HEUN = 1.0
 """The same for sensitivities along a linearisation."""
 

@@ -11,6 +11,8 @@ divided into as many steps as it needs:
 The memory of a contact, which is a share of where it slips, asks for them only while it moves: once
 it slips its rate is zero, however fast it would return. So that it stays there in any step, the
 integration leaves no memory faster than a step allows (`bounded_memory`, `integrator.DAMPED`).
+Dry friction that holds a contact at rest is a mode that decays, and asks for a tenth
+(`integrator.AT_REST`).
 
 A model's own constant rates, such as R/L of a winding, ask for the same. Where a step is just
 stable a mode that should decay at once does not decay at all, so that its initial state becomes a
