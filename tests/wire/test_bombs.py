@@ -21,7 +21,7 @@ from rigwatch.wire.exchange.mat5 import MatError, read_mat5
 from rigwatch.wire.exchange.table_files import MOST_COLUMNS, read_table
 from rigwatch.wire.messages import EstimateBlock, SampleBlock, decode
 from rigwatch.wire.messages.packed import decode_block
-from rigwatch.wire.session import open_session
+from rigwatch.wire.session import chunk_reader, open_session
 from rigwatch.wire.session.chunk_reader import MOST_OTHERS
 from rigwatch.wire.session.chunks import MAGIC
 from rigwatch.wire.typed_files import parse
@@ -80,6 +80,37 @@ def test_many_packed_records_of_no_kind_are_refused_at_the_first_of_them(tmp_pat
     path.write_bytes(MAGIC + chunk(bytes(64 << 20)) * 3 + MAGIC)
     with pytest.raises(SessionError, match=f"more than {MOST_OTHERS} records"):
         list(open_session(path).samples())
+
+
+def message(channel: int, body: bytes) -> bytes:
+    return record(5, struct.pack("<HIQQ", channel, 0, 0, 0) + body)
+
+
+FOREIGN = record(4, struct.pack("<HHI6sI4sI", 77, 0, 6, b"camera", 4, b"json", 0))
+PACKED = {
+    "messages of another topic": message(77, b"") * 400_000,
+    "a long message of another topic": message(77, bytes(60 << 20)),
+    "declarations": FOREIGN * 12_000,
+    "messages of rigwatch without content": message(2, b"") * 400_000,
+}
+
+
+@pytest.mark.parametrize("records", PACKED.values(), ids=PACKED)
+def test_packed_records_that_hold_nothing_are_read_only_as_far_as_the_size_of_the_file_warrants(
+    tmp_path: Path, records: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(chunk_reader, "BASE", 1 << 26)  # for the time of the test
+    path = tmp_path / "bomb.mcap"
+    path.write_bytes(intact()[: -len(MAGIC)] + chunk(FOREIGN + records) * 3 + MAGIC)
+    with pytest.raises(SessionError, match="unpacks to far more than a file of its size"):
+        list(open_session(path).messages(["run"]))
+
+
+def test_messages_of_others_that_are_in_a_session_are_passed_over(tmp_path: Path) -> None:
+    path = tmp_path / "shared.mcap"
+    frames = (message(77, np.random.default_rng(n).bytes(60_000)) for n in range(32))
+    path.write_bytes(intact()[: -len(MAGIC)] + chunk(FOREIGN + b"".join(frames)) * 2 + MAGIC)
+    assert list(open_session(path).samples())
 
 
 @pytest.mark.parametrize("records", MALFORMED.values(), ids=MALFORMED)

@@ -9,7 +9,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.records import Channel, Schema
 
-from rigwatch.wire.errors import SessionError
+from rigwatch.wire.errors import SessionError, reason_of
 from rigwatch.wire.messages import TOPICS, Topic
 from rigwatch.wire.messages import protobuf_schema as schema
 from rigwatch.wire.session.writer import FORMAT, FORMAT_KEY
@@ -22,13 +22,25 @@ _BY_NAMES = {(line.name, schema.type_name(line.message)): line for line in TOPIC
 
 MOST_OTHERS = 10_000
 """Records of a file's chunks that are neither messages nor declarations."""
+BASE, RATIO = 1 << 30, 200
+"""Bytes that any file may unpack to beside the data of rigwatch, and the same per byte of it."""
+RECORD_COST, DECLARATION_COST = 512, 1 << 14
+"""Bytes that take the time of a record without content, and of a declaration."""
 
 
 class ChunkReader:
     """Splits the records of intact chunks into messages, with the channels declared so far.
 
     Undeclared channels, whose declaration was in a damaged chunk, take the numbers of the table of
-    topics.
+    topics. What a file may unpack to is bounded by its size: packed, millions of records take no
+    room. Content of rigwatch's own messages is not counted, since a constant recording packs well.
+
+    Args:
+        path: the file.
+        foreign: takes the names of topics of others.
+
+    Raises:
+        SessionError: the file cannot be read.
     """
 
     def __init__(self, path: Path, foreign: set[str]) -> None:
@@ -36,6 +48,7 @@ class ChunkReader:
         self._schemas: dict[int, str] = {}
         self._lines: dict[int, Topic | None] = {}
         self._others = 0
+        self._left = BASE + RATIO * _size(path)
 
     def messages(self, records: bytes) -> Iterator[tuple[Topic, int, bytes]]:
         """Topic, time and bytes of each message.
@@ -53,16 +66,24 @@ class ChunkReader:
         while at + _RECORD.size <= end:
             opcode, length = _RECORD.unpack_from(records, at)
             at += _RECORD.size
+            self._left -= RECORD_COST
+            if self._left < 0:
+                raise ValueError("unpacks to far more than a file of its size, expected less")
             if opcode == _MESSAGE:
                 number, _, t_ns, _ = _MESSAGE_HEAD.unpack_from(records, at)
                 line = self._line(number)
                 if line is not None:
                     yield line, t_ns, records[at + _MESSAGE_HEAD.size : at + length]
+                else:
+                    self._left -= length
             elif opcode == _SCHEMA:
+                self._left -= length + DECLARATION_COST
                 self._schemas |= _read_schema(records[at : at + length])
             elif opcode == _CHANNEL:
+                self._left -= length + DECLARATION_COST
                 self._declare(records[at : at + length])
             else:
+                self._left -= length
                 self._pass_over()
             at += length
 
@@ -87,6 +108,13 @@ class ChunkReader:
             raise SessionError(
                 f"{self._path}: session format {version}, this rigwatch reads up to {FORMAT}"
             )
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError as error:
+        raise SessionError(f"{path}: cannot be read: {reason_of(error)}") from error
 
 
 def _read_schema(body: bytes) -> dict[int, str]:
