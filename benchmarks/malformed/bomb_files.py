@@ -23,7 +23,7 @@ _ZIPPED, _MATRIX, _INT8 = 15, 14, 1  # data types of MAT files
 
 
 def bombs(chance: random.Random, session: bytes) -> dict[str, list[Bomb]]:
-    """Forty bombs by the kind of file, their sizes drawn.
+    """Bombs by the kind of file, their sizes drawn.
 
     Args:
         chance: draws them.
@@ -68,6 +68,14 @@ def _sessions(size: int, other: int, many: int, session: bytes) -> list[Bomb]:
         records = _record(0x7F, b"") * many
         return _chunk(records, zstandard.compress(records), b"zstd")
 
+    def others(records: bytes) -> bytes:
+        """An intact session, and forty chunks of what is no message of rigwatch."""
+        channel = _record(4, struct.pack("<HHI6sI4sI", 77, 0, 6, b"camera", 4, b"json", 0))
+        records = channel + records * ((60 * MB) // len(records))
+        return begun + _chunk(records, zstandard.compress(records), b"zstd") * 40 + MAGIC
+
+    message = _record(5, struct.pack("<HIQQ", 77, 0, 0, 0))
+    declared = _record(3, struct.pack("<HI5sI4sI", 9, 5, b"Image", 4, b"json", 0))
     return [
         ("unpacks to much", lambda: MAGIC + zstd(size) + MAGIC),
         ("unpacks to much by lz4", lambda: MAGIC + lz4_of(other) + MAGIC),
@@ -77,6 +85,8 @@ def _sessions(size: int, other: int, many: int, session: bytes) -> list[Bomb]:
         ("millions of empty records", lambda: MAGIC + small_records() + MAGIC),
         ("a record of 10^18 bytes", lambda: begun + struct.pack("<BQ", 5, HUGE) + MAGIC),
         ("many chunks", lambda: MAGIC + zstd(64 * MB) * 40 + MAGIC),
+        ("millions of messages of others", lambda: others(message)),
+        ("millions of declarations", lambda: others(declared)),
     ]
 
 
@@ -155,12 +165,21 @@ def _columns(length: int, wide: int) -> list[Bomb]:
         names = {"t": [0.0, 4.0], "x": [text, text], "u": [text, text]}
         return written(pyarrow.table(names), compression="zstd")
 
+    def repeated_texts() -> bytes:
+        import pyarrow
+
+        rows = length // 4096
+        texts = pyarrow.DictionaryArray.from_arrays(np.zeros(rows, np.int32), ["a" * 100_000])
+        names = {"t": 4.0 * np.arange(rows), "x": texts, "u": texts}
+        return written(pyarrow.table(names), compression="zstd", store_schema=False)
+
     return [
         ("unpacks to much", lambda: zeros("f8", "zstd")),
         ("repeats a value without packing", lambda: zeros("i8", "none")),
         ("repeats values of a byte", lambda: zeros("i1", "gzip", use_dictionary=False)),
         ("thousands of columns", many_columns),
         ("texts of 64 MB", long_texts),
+        ("a text that thousands of rows repeat", repeated_texts),
     ]
 
 

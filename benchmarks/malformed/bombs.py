@@ -1,4 +1,4 @@
-"""Forty bombs: each is refused in one line, in seconds, and without the memory that it asks for.
+"""Bombs: each is refused in one line, in seconds, and without the memory that it asks for.
 
 A bomb is made by one process and read by another, which begins with all that reading needs.
 """
@@ -32,7 +32,7 @@ Found = tuple[str, float, float]
 
 
 def run(quick: bool) -> list[Row]:
-    """All forty, also when quick: they take a minute."""
+    """All of them, also when quick: they take a minute."""
     del quick
     with TemporaryDirectory() as name:
         folder = Path(name)

@@ -176,6 +176,35 @@ def test_parquet_texts_that_unpack_to_much_are_refused_and_so_are_too_many_colum
     assert found in peak_of(ImportDataError, read_table, path, ImportMapping())
 
 
+def test_a_parquet_text_that_many_rows_repeat_takes_the_memory_of_one(tmp_path: Path) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    rows, path = 4000, tmp_path / "bomb.parquet"
+    texts = pyarrow.DictionaryArray.from_arrays(np.zeros(rows, np.int32), ["a" * 20_000])
+    lists = pyarrow.ListArray.from_arrays(np.arange(rows + 1, dtype=np.int32), texts)
+    columns = {"t": np.arange(float(rows)), "u": texts, "notes": lists}
+    parquet.write_table(pyarrow.table(columns), path, store_schema=False)
+    tracemalloc.start()
+    cells = read_table(path, ImportMapping()).cells
+    assert tracemalloc.get_traced_memory()[1] < 8 << 20
+    tracemalloc.stop()
+    assert list(cells) == ["t", "u"]
+    assert {*cells["u"]} == {"a" * 20_000}
+
+
+def test_parquet_columns_whose_names_select_each_other_are_refused(tmp_path: Path) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    for number, second in enumerate(("t", "t.u")):
+        path = tmp_path / f"{number}.parquet"
+        inside = pyarrow.array([{"v": 1.0}])
+        parquet.write_table(pyarrow.Table.from_arrays([[0.0], inside], ["t", second]), path)
+        with pytest.raises(ImportDataError, match="several columns of one name"):
+            read_table(path, ImportMapping())
+
+
 def test_an_error_that_quotes_a_long_name_is_cut(tmp_path: Path) -> None:
     with pytest.raises(ImportDataError, match="found no column") as error:
         made(tmp_path, f"t,{'a' * 100_000}\n0,1\n1,2\n2,3\n", simple())

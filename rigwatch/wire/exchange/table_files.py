@@ -98,14 +98,17 @@ def _read_parquet(path: Path, _: ImportMapping) -> Table:
     import pyarrow
 
     try:
-        with parquet.ParquetFile(path) as file:
-            Budget(path.stat().st_size).take(_unpacked_bytes(file.metadata))
-            found = file.read()
+        found = parquet.read_metadata(path)
+        Budget(path.stat().st_size).take(_unpacked_bytes(found))
+        flat = _flat(found)
+        # As dictionaries: a text that is stored once for many rows stays one in memory too.
+        with parquet.ParquetFile(path, read_dictionary=flat) as file:
+            read = file.read(columns=flat)
     except (pyarrow.ArrowException, ValueError) as error:
         reason = str(error).splitlines()[0]
         raise ImportDataError(f"{path}: not a readable Parquet file: {reason}") from error
     return Table(
-        path, {name: found[name].to_numpy(zero_copy_only=False) for name in found.column_names}
+        path, {name: read[name].to_numpy(zero_copy_only=False) for name in read.column_names}
     )
 
 
@@ -114,7 +117,33 @@ def _unpacked_bytes(found: Any) -> int:
     if found.num_columns > MOST_COLUMNS:
         raise ValueError(f"{found.num_columns} columns, expected at most {MOST_COLUMNS}")
     unpacked = sum(int(found.row_group(n).total_byte_size) for n in range(found.num_row_groups))
-    return max(unpacked, 8 * int(found.num_rows) * int(found.num_columns))
+    return max(unpacked, 8 * int(found.num_rows) * int(found.num_columns), _in_arrays(found))
+
+
+def _in_arrays(found: Any) -> int:
+    """Memory of the values of all columns: lists have several a row, wide ones many bytes each."""
+    widths = [max(8, int(found.schema.column(n).length)) for n in range(found.num_columns)]
+    groups = map(found.row_group, range(found.num_row_groups))
+    return sum(
+        width * int(group.column(n).num_values)
+        for group in groups
+        for n, width in enumerate(widths)
+    )
+
+
+def _flat(found: Any) -> list[str]:
+    """Names of the columns with one value a row.
+
+    Lists and structures are no columns of a log, and repeat a text once for each of them.
+    """
+    paths = [found.schema.column(n).path for n in range(found.num_columns)]
+    arrow = found.schema.to_arrow_schema()
+    flat = [field.name for field in arrow if not field.type.num_fields]
+    within = tuple(f"{name}." for name in flat)
+    # Such names select each other.
+    if len({*paths}) < len(paths) or any(p.startswith(within) for p in {*paths} - {*flat}):
+        raise ValueError("several columns of one name, expected one of each")
+    return flat
 
 
 _READERS: dict[str, Callable[[Path, ImportMapping], Table]] = {
