@@ -60,6 +60,7 @@ class Attacked:
     def __init__(self, folder: Path) -> None:
         keys = make_keys(folder / "keys")
         section = monitor_section(folder) + "\n[witness]\n"
+        section += f'\n[recorder]\nfolder = "{folder}/sessions"\n'
         self.rig = SecuredRig(folder, keys, section)
         self.model = folder / "model.toml"
         self.processes: dict[str, subprocess.Popen[bytes]] = {}

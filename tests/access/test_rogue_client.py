@@ -1,25 +1,57 @@
 """A hostile client sends 200 kinds of message everywhere: nothing ends, nothing is changed."""
 
 import time
-from pathlib import Path
+from collections.abc import Iterator
 
-from tests.access.attack import attacked
+import pytest
+
+from rigwatch.wire.bus import KEY as MODEL_KEY
+from tests.access.answer_times import KEYS, asked, questions
+from tests.access.attack import Attacked, attacked
 from tests.access.rogue import ASKED, KINDS, NAMED, SAID, everything, kinds
+from tests.waiting import eventually
+
+LONGEST_S, ATTEMPTS = 0.1, 3
+"""Longest time of an answer; the shortest of the attempts counts, as a machine is busy at times."""
+pytestmark = pytest.mark.xdist_group("rogue client")  # one rig for both
 
 
-def test_two_hundred_kinds_of_message_change_nothing(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Attacked]:
+    with attacked(tmp_path_factory.mktemp("rig")) as made:
+        yield made
+
+
+def test_two_hundred_kinds_of_message_change_nothing(rig: Attacked) -> None:
     payloads = kinds()
     assert len(set(payloads)) > 0.8 * KINDS
     messages = list(everything(payloads))
     assert len(messages) == KINDS * (len(SAID) + len(NAMED) + len(ASKED))
-    with attacked(tmp_path) as rig:
-        # Every seventh: all of them run in `python -m benchmarks rogue_client`.
-        rig.attack(messages[::7], time.monotonic() + 60.0)
-        rig.knock(10)
-        found = rig.judge()
+    # Every seventh: all of them run in `python -m benchmarks rogue_client`.
+    rig.attack(messages[::7], time.monotonic() + 60.0)
+    rig.knock(10)
+    found = rig.judge()
     assert found.ended == []
     assert found.samples > 0
     assert (found.wrong, found.lost, found.changes) == (0, 0, [])
     assert found.refused_connections >= found.connections == 10
     assert found.denied > 0
     assert found.refused > 0
+
+
+def test_every_queryable_answers_or_refuses_within_100_ms(rig: Attacked) -> None:
+    processes = [*rig.processes.values()]
+    processes.append(rig.rig.start("-m", "rigwatch", "record", str(rig.rig.path)))
+    bus = rig.rig.bus("ack-ann")
+    slow = {}
+    for key in KEYS:
+        ordinary, *hostile = questions(key, rig.model)
+        eventually(lambda k=key, q=ordinary: bool(asked(bus, k, q)[1]), f"{key} answers")  # type: ignore[misc]
+        for number, question in enumerate((ordinary, *hostile)):
+            times = (asked(bus, key, question)[0] for _ in range(ATTEMPTS))
+            if all(taken >= LONGEST_S for taken in times):
+                slow[key, number] = question
+    assert slow == {}
+    promoted = asked(bus, MODEL_KEY, next(questions(MODEL_KEY, rig.model)))[1]
+    assert [b"in force" in answer for answer in promoted] == [True]
+    assert [process.poll() for process in processes] == [None] * len(processes)
