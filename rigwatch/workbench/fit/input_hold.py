@@ -13,8 +13,7 @@ Inputs that are seen to be held, as their steps start and end at rest, are not t
 however far off the model is: a line through a step begins half a sample before the step.
 """
 
-from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -23,10 +22,9 @@ from msgspec import structs
 from scipy.optimize import minimize_scalar
 
 from rigwatch.physics.engine.equations import Hold, Model, Placement
-from rigwatch.physics.engine.score import suits
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.data import Data, parameters_of, port_sizes, quiet_scale
+from rigwatch.workbench.data import Data, parameters_of, quiet_scale
 from rigwatch.workbench.fit.fitted import Fitted, block_differences, block_errors
 from rigwatch.workbench.fit.fitted_model import fit_model, placements_of
 from rigwatch.workbench.study import Held, Study
@@ -41,8 +39,6 @@ DELAYS = (0.25, 0.5, 0.75, 1.0)
 """Delays tried before the best is refined, as shares of a sample."""
 FINE = 5e-4
 """Resolution of the delay, as a share of a sample."""
-LAG = "lag"
-"""Effect of what is slow, which may seem to be an input that acts late."""
 STEP = 0.05
 """Least change of an input that counts as a step, over its range."""
 STEPPED = 0.9
@@ -76,10 +72,9 @@ def with_hold(study: Study, data: Data, scale: FloatArray | None = None) -> Stud
     if not model.states:
         return replace(study, model=with_holds(model, dict.fromkeys(names, ("linear", 0.0))))
     source_data = data.of_healthy or data
-    healthy = data.healthy is not None
-    placements = () if healthy else placements_of(study, data.train)
-    source = "the healthy recording" if healthy else "the recordings"
-    best, line = _chosen(study, source_data, placements, scale, healthy=healthy)
+    placements = () if data.healthy is not None else placements_of(study, data.train)
+    source = "the healthy recording" if data.healthy is not None else "the recordings"
+    best, line = _chosen(study, source_data, placements, scale)
     before, after = (float(np.nanmean(_blocks(each.fitted))) for each in (line, best))
     held = Held(
         best.hold, best.late, source_data.train.dt * best.late, source, (after / before) ** 0.5
@@ -109,18 +104,9 @@ def held_as(study: Study, holds: Mapping[str, Held]) -> Study:
 
 
 def _chosen(
-    study: Study,
-    data: Data,
-    placements: tuple[Placement, ...],
-    scale: FloatArray | None,
-    *,
-    healthy: bool,
+    study: Study, data: Data, placements: tuple[Placement, ...], scale: FloatArray | None
 ) -> tuple[_Tried, _Tried]:
-    """The best hold, and a line.
-
-    A sensor or drive that is slow makes an input seem late, by up to a sample: late is one that
-    explains more than anything slow does, unless the recording is that of the healthy machine.
-    """
+    """The best hold, and a line."""
     try_one = partial(_tried, study, data, placements, scale)
     # The healthy recording is modelled without the accepted effects.
     start = parameters_of(study.file) if placements else dict(study.file.start)
@@ -130,37 +116,7 @@ def _chosen(
     if data.along_motion or _at_noise(best, data, scale):
         return best, line
     late = _refined(partial(try_one, "zero"), kept)
-    if late is None or not _better(late, best):
-        return best, line
-    # What is slow in a healthy machine is a part of it.
-    lags = () if healthy else _with_lag(study, data, placements, scale, best)
-    return (best if any(_better(each, late) for each in lags) else late), line
-
-
-def _with_lag(
-    study: Study,
-    data: Data,
-    placements: tuple[Placement, ...],
-    scale: FloatArray | None,
-    held: _Tried,
-) -> Iterator[_Tried]:
-    """The model with a hold and with something slow at each port where it may be."""
-    if LAG not in study.effects:
-        return
-    model, sizes = study.model, port_sizes(study.model, data.train)
-    study = replace(
-        study, model=with_holds(model, dict.fromkeys(model.unheld(), (held.hold, held.late)))
-    )
-    for port in (
-        name for name, own in model.ports.items() if suits(study.effects[LAG], own, model)
-    ):
-        slow = Placement(LAG, study.effect_at(LAG, port).scaled(sizes[port]), port)
-        with suppress(ModelError):
-            fitted = fit_model(
-                study, data, (*placements, slow), held.fitted.train.values(), scale,
-                base=held.fitted,
-            )  # fmt: skip
-            yield _Tried(held.hold, held.late, fitted)
+    return (late if late is not None and _better(late, best) else best), line
 
 
 def _seen_held(study: Study, data: Data) -> bool:
