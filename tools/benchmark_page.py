@@ -44,6 +44,7 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
             "random_kills",
             "a_year",
             "rogue_client",
+            "bombs",
             "fuzzing",
             "replay",
             "windowed_least_squares",
