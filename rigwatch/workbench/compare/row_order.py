@@ -15,7 +15,7 @@ from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, predicts_along_motion, quiet_scale, with_next_rows
 from rigwatch.workbench.fit import Fitted, fit_base, fit_model
 from rigwatch.workbench.ranking import difference
-from rigwatch.workbench.study import Held, Study
+from rigwatch.workbench.study import HEALTHY, RECORDINGS, Held, Study
 
 MUCH = 0.1
 """Relative fall of the rms error that is required."""
@@ -42,7 +42,7 @@ def with_row_order(study: Study, data: Data) -> tuple[Study, Data]:
     after = _fitted_with_next_rows(study, own, names, before, scale)
     if after is None or not _much_better(before, after):
         return study, data
-    source = "the recordings" if data.healthy is None else "the healthy recording"
+    source = RECORDINGS if data.healthy is None else HEALTHY
     ratio = after.train_error / before.train_error
     found = {name: Held("zero", -1.0, -own.train.dt, source, ratio) for name in names}
     return replace(study, holds={**study.holds, **found}), _ordered(study, data, names)

@@ -27,7 +27,7 @@ from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, parameters_of, quiet_scale
 from rigwatch.workbench.fit.fitted import Fitted, block_differences, block_errors
 from rigwatch.workbench.fit.fitted_model import fit_model, placements_of
-from rigwatch.workbench.study import Held, Study
+from rigwatch.workbench.study import HEALTHY, RECORDINGS, Held, Study
 
 BEYOND_CHANCE = 3.0
 """Standard deviations by which the error must fall."""
@@ -73,7 +73,7 @@ def with_hold(study: Study, data: Data, scale: FloatArray | None = None) -> Stud
         return replace(study, model=with_holds(model, dict.fromkeys(names, ("linear", 0.0))))
     source_data = data.of_healthy or data
     placements = () if data.healthy is not None else placements_of(study, data.train)
-    source = "the healthy recording" if data.healthy is not None else "the recordings"
+    source = HEALTHY if data.healthy is not None else RECORDINGS
     best, line = _chosen(study, source_data, placements, scale)
     before, after = (float(np.nanmean(_blocks(each.fitted))) for each in (line, best))
     held = Held(

@@ -7,10 +7,7 @@ in the model, before it is written to the study.
 
 from rigwatch.workbench.compare import Bench, Warm, with_horizon_of
 from rigwatch.workbench.fit import held_as
-from rigwatch.workbench.study import Accepted, Study, append_effect, keep_holds
-
-RECORDINGS = "the recordings"
-"""Source of holds that depend on the effects in the model: a healthy recording has none."""
+from rigwatch.workbench.study import RECORDINGS, Accepted, Study, append_effect, keep_holds
 
 
 def with_kept_holds(study: Study, accepted: Accepted, bench: Bench, warm: Warm) -> Study:
@@ -30,6 +27,7 @@ def with_kept_holds(study: Study, accepted: Accepted, bench: Bench, warm: Warm) 
     before = bench.study.holds
     plain = with_horizon_of(study, bench.study)
     as_before = append_effect(keep_holds(held_as(plain, before)), accepted)
+    # A hold chosen from a healthy recording does not depend on the effects.
     if not any(held.source == RECORDINGS for held in before.values()):
         return as_before
     free = warm.bench(append_effect(keep_holds(plain), accepted)).study.holds

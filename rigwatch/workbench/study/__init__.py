@@ -17,6 +17,8 @@ from rigwatch.workbench.study.moving_parameters import judged_alone
 from rigwatch.workbench.study.recording_parameters import Known
 from rigwatch.workbench.study.study import (
     GIVEN,
+    HEALTHY,
+    RECORDINGS,
     Held,
     Kept,
     Study,
@@ -31,8 +33,10 @@ from rigwatch.workbench.study.told_units import NOISES, told, told_unit
 __all__ = [
     "FILE",
     "GIVEN",
+    "HEALTHY",
     "LEDGER",
     "NOISES",
+    "RECORDINGS",
     "Accepted",
     "Derive",
     "Derived",

@@ -51,6 +51,8 @@ from rigwatch.workbench.study.told_units import with_shown_units
 
 GIVEN = ("the study", "the model file")
 """Sources of holds that were given rather than chosen from data."""
+HEALTHY, RECORDINGS = "the healthy recording", "the recordings"
+"""Sources of a hold that is chosen from data; the healthy recording is fitted without effects."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from rigwatch.wire.arrays import FloatArray
 
 MOST_SUBSTEPS = 64
 MOST_FOR_MEMORY = 32
-"""The same for a memory, which no step makes unstable."""
+"""Most of them for a memory, which no step makes unstable."""
 FINER = 2.0
 """Steps relative to the stability limit of effect states: sensitivities use Heun's method, which
 must be accurate.
@@ -41,11 +41,9 @@ def even_substeps(
     for at in (states, standing):
         asked = function(0.0, 0.0, *at.T, *inputs.T, *parameters, *[0.0] * len(system.probes))
         sizes = [float(np.nanmax(np.abs(rate))) for rate in asked]
-        at_most = MOST_FOR_MEMORY / (FINER * spacing)
-        bounded = len(sizes) - wanted.bounded
-        sizes[bounded:] = [min(size, at_most) for size in sizes[bounded:]]
-        steep, memory = sizes[: len(wanted.crossing)], sizes[len(wanted.crossing) :]
-        fastest = max(
-            fastest, *(size / COARSER for size in steep), *(FINER * size for size in memory)
-        )
+        steep, bounded = len(wanted.crossing), len(sizes) - wanted.bounded
+        steps = [size / COARSER for size in sizes[:steep]]
+        steps += [FINER * size for size in sizes[steep:bounded]]
+        steps += [min(FINER * size, MOST_FOR_MEMORY / spacing) for size in sizes[bounded:]]
+        fastest = max(fastest, *steps)
     return int(min(MOST_SUBSTEPS, max(1, np.ceil(fastest * spacing))))

@@ -82,7 +82,7 @@ def pace(system: System) -> Pace:
     memory = bounded_memory(system)
     others = [n for n in system.states if n not in {*system.model.states, *memory}]
     asked += [
-        slope / (PASSIVE if _is_constant(system, slope) else allowed)
+        slope / (CONSTANT if _is_constant(system, slope) else allowed)
         for slope in _returns(system, others)
     ]
     bounded = [
