@@ -1,9 +1,11 @@
 """Removes old segments by age and total size; segments with alarms stay longer.
 
 A closed segment states in its summary how many alarms it holds. One that does not (still open, or
-its recorder was killed) counts as one with alarms.
+its recorder was killed) counts as one with alarms. The size stays within its limit between two
+checks too: each leaves room for as much as was recorded since the last one.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,6 +43,7 @@ class Retention:
         self._settings, self._rig = settings, rig
         self._alarms: dict[Path, bool] = {}
         self._due = 0.0
+        self._left = math.inf
 
     def update(self, now: float, t_ns: int, current: Path) -> list[Event]:
         """Remove expired segments, at most once a minute, and report them.
@@ -66,7 +69,11 @@ class Retention:
         kept = _size(newest) if newest else 0
         found = list(self._segments(newest))
         self._alarms = {one.path: one.alarms for one in found}  # others remove segments too
-        return expired(found, self._settings, now_s, kept)
+        size = kept + _size_in(current, found)
+        room = int(max(0.0, size - self._left))
+        gone = expired(found, self._settings, now_s, kept + room)
+        self._left = size - _size_in(current, gone)
+        return gone
 
     def _segments(self, newest: Path | None) -> Iterator[Segment]:
         root = Path(self._settings.folder)
@@ -103,6 +110,10 @@ def _remove(path: Path) -> bool:
 def _newest(current: Path) -> Path | None:
     """The segment that is being written."""
     return max(current.glob(f"*{SUFFIX}"), default=None)
+
+
+def _size_in(folder: Path, segments: list[Segment]) -> int:
+    return sum(one.size for one in segments if one.path.parent == folder)
 
 
 def _size(path: Path) -> int:

@@ -34,7 +34,8 @@ def expired(
         recordings: of one rig, without the one that is being written.
         rules: `keep_days`, `keep_alarm_days` and `keep_gigabytes`; 0 disables a limit.
         now_s: Unix time [s].
-        kept: size of what is being written, which is kept and counts [bytes].
+        kept: size that counts and is not among them: of what is being written, and room for what
+            comes before the next check [bytes].
     """
     found = sorted(recordings, key=lambda one: (one.alarms, one.ended))
     old = [one for one in found if _is_old(one, rules, now_s)]

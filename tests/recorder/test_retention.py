@@ -110,6 +110,23 @@ def test_the_segment_being_written_counts_for_the_size(tmp_path: Path) -> None:
     assert left(tmp_path) == {f"{current.name}/{number:06d}" for number in (2, 3)}
 
 
+def test_the_size_stays_within_its_limit_between_two_checks(tmp_path: Path) -> None:
+    current = tmp_path / "bench-20260301T000000Z"
+    size = segment(current, 0, age_days=1.0).stat().st_size
+    retention = rules(tmp_path, keep_gigabytes=6.5 * size / 1e9)
+    most = 0
+    for minute in range(10):
+        retention.update(60.0 * minute, int(NOW * 1e9), current)
+        for number in (2 * minute + 1, 2 * minute + 2):
+            segment(current, number, age_days=1.0 - number / 100.0)
+        most = max(most, len(left(tmp_path)))
+    assert most == 6
+    for number in range(6):
+        segment(tmp_path / "bench-20260101T000000Z", number, age_days=30.0)
+    retention.update(600.0, int(NOW * 1e9), current)
+    assert len(left(tmp_path)) == 4, "what was put there from elsewhere does not come again"
+
+
 def test_what_others_remove_is_forgotten(tmp_path: Path) -> None:
     old, current = tmp_path / "bench-20260101T000000Z", tmp_path / "bench-20260301T000000Z"
     path = segment(old, 1, 1.0)
