@@ -12,7 +12,8 @@ from msgspec import structs
 
 from benchmarks.watching.rig import RATE, blocks, commissioned, scenario
 from monitor.diagnosis.background_ranking import WAIT
-from monitor.diagnosis.fault_candidates import LEVEL, Evidence, Suspect, suspects
+from monitor.diagnosis.fault_candidates import LEVEL, Suspect, suspects
+from monitor.diagnosis.observed_change import Evidence
 from monitor.pipeline.pipeline import Monitor
 from monitor.signals.conditions import DEPARTURE
 from rigwatch.physics.engine.equations.effect_files import library

@@ -2,26 +2,28 @@
 
 The engine's score test, as in a study: the first-order change that an effect at a port would cause
 along the measured motion is compared with the observed change. p-values allow for residuals that
-are correlated and for the number of candidates; effects whose directions are nearly parallel form a
-class, except those that are clearly worse. Nothing is fitted; a study gives more detail.
+are correlated and for the number of candidates. The first of the ranking are then fitted, so that
+an effect counts with the size that it has. Those that explain nearly as much as the best, given how
+well the model's response is known, form a class, and the simplest of them names it.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from monitor.diagnosis.observed_change import Evidence, ObservedChange, model_error
 from monitor.diagnosis.rig_ports import RigPorts, rig_ports
+from monitor.diagnosis.sized_effects import sized
 from monitor.model import RigModel
 from rigwatch.physics.engine.compile import compile_system
 from rigwatch.physics.engine.equations import Effect, Port, compose
-from rigwatch.physics.engine.fit import filled
 from rigwatch.physics.engine.score import (
     Candidate,
     Projector,
     Scores,
     Standing,
+    Trajectory,
     candidates,
     corrected_p_values,
     directions,
@@ -39,29 +41,10 @@ LEVEL = 0.01
 """Corrected p-value above which no candidate is named."""
 EXPLAINED = 0.5
 """Share of the change's energy below which the best effect is rejected."""
-NEARLY = 0.02
-"""Difference in that share below which the first order cannot rank two effects."""
-BLOCKS, WORSE = 16, 3.0
-"""Pieces of the samples over which two effects are compared, and standard errors that count."""
+SIZED, LEAST_SIZED = 24, 0.3
+"""Number of effects that are fitted, and what each has to explain of what the best explains."""
 FEWEST = 64
 """Fewest samples for a ranking."""
-SETTLED = 0.25
-"""Time from the onset until effects have built up [s]."""
-
-
-@dataclass(frozen=True, eq=False)
-class Evidence:
-    """Samples around an alarm.
-
-    Attributes:
-        signals: the model's channels, NaN if invalid, shape (n, channels).
-        change: of the residual against the healthy rig [m/s^2], shape (n,).
-        onset: row at which the change began.
-    """
-
-    signals: FloatArray
-    change: FloatArray
-    onset: int
 
 
 @dataclass(frozen=True)
@@ -73,6 +56,7 @@ class Suspect:
         p_value: corrected for all candidates.
         explained: share of the change's energy.
         parameters: free ones.
+        family: of the effect, see `Effect`.
         alike: others that these samples cannot distinguish from it, as "effect@port".
     """
 
@@ -81,7 +65,8 @@ class Suspect:
     p_value: float
     explained: float
     parameters: int
-    alike: tuple[str, ...]
+    family: str = ""
+    alike: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:
@@ -94,41 +79,30 @@ def suspects(evidence: Evidence, model: RigModel, effects: Mapping[str, Effect])
 
     An effect whose strength has the wrong sign is excluded.
     """
-    ports = rig_ports(model, _bridged(evidence.signals))
-    found = _candidates(ports, effects, model)
-    pushes = _pushes(ports, found, evidence.onset, 1 / model.sample_rate)
-    moved = np.empty_like(pushes)
-    for index, candidate in enumerate(found):
-        moved[:, index] = ports.responses[candidate.port](pushes[:, index].copy())
-    rows = _counted(evidence, model)
-    if rows.sum() < FEWEST:
+    change = np.nan_to_num(evidence.change)
+    ports = rig_ports(model, evidence.bridged, change)
+    observed = ObservedChange(evidence, model, ports)
+    if len(observed.values) < FEWEST:
         return []
-    scale = model.noise.residual
-    residual = (evidence.change - ports.known)[rows] / scale
-    nothing = np.zeros((1, len(residual), 0))
-    scores = score(
-        residual[None], moved[rows][None] / scale, Projector(nothing, nothing), variance=1.0
-    )
-    p_values = corrected_p_values(scores, residual[None, :, None])
-    allowed = _allowed(ports, found, scores, pushes[rows])
-    ranked = standings([c.label for c in found], scores, p_values, allowed)
-    return _named([(_suspect(found[s.index], s), s.index) for s in ranked], residual, scores.units)
+    found = _candidates(ports, effects, model)
+    at = _along(ports, evidence.onset, 1 / model.sample_rate)
+    ranked = _ranked(ports, found, observed, _pushes(ports, at, found))
+    rows = _sized(ranked, found, at, observed)
+    return _named(rows, observed.noise_share, model_error(model))
 
 
-def _counted(evidence: Evidence, model: RigModel) -> NDArray[np.bool_]:
-    """Rows whose change the directions can be held against: effects have built up since the onset,
-    and filters have settled since the last hole in the signals.
-    """
-    settled, count = round(SETTLED * model.sample_rate), len(evidence.change)
-    missing = ~np.isfinite(evidence.signals).all(axis=1)
-    lately = np.convolve(missing, np.ones(max(model.decision.settle, 1)))[:count]
-    since_onset = np.arange(count) >= evidence.onset + settled
-    whole = lately <= model.decision.longest_hold
-    return np.asarray(since_onset & whole & np.isfinite(evidence.change))
-
-
-def _bridged(signals: FloatArray) -> FloatArray:
-    return np.stack([filled(signal) for signal in signals.T], axis=1)
+def _ranked(
+    ports: RigPorts, found: Sequence[Candidate], observed: ObservedChange, pushes: FloatArray
+) -> list[Standing]:
+    """To first order, those that explain most first."""
+    moved = [observed.caused(c.port, push) for c, push in zip(found, pushes.T, strict=True)]
+    flat = np.stack([one.ravel() for one in moved], axis=1)
+    values = observed.values
+    nothing = np.zeros((1, values.size, 0))
+    scores = score(values.reshape(1, -1), flat[None], Projector(nothing, nothing), variance=1.0)
+    p_values = corrected_p_values(scores, values[None])
+    allowed = _allowed(ports, found, scores, pushes[observed.rows])
+    return standings([c.label for c in found], scores, p_values, allowed)
 
 
 def _candidates(ports: RigPorts, effects: Mapping[str, Effect], model: RigModel) -> list[Candidate]:
@@ -155,15 +129,19 @@ def _signal(port: Port, columns: Mapping[str, FloatArray]) -> FloatArray:
     return columns[name if name in columns else "measured"]
 
 
-def _pushes(ports: RigPorts, found: Sequence[Candidate], onset: int, dt: float) -> FloatArray:
-    """What each candidate adds at its port for a strength of 1, shape (n, candidates)."""
+def _along(ports: RigPorts, onset: int, dt: float) -> Trajectory:
+    """The signals at the ports; time runs from the onset."""
     compiled, count = compile_system(compose(ports.model)), len(ports.inputs)
     at = trajectory(
         compiled, ports.inputs, dt, np.zeros(1, np.int64), count,
         initial=np.zeros((1, 0)), parameters=np.zeros(0), substeps=1,
     )  # fmt: skip
-    since = np.maximum(np.arange(count) - onset, 0)[None] * dt
-    added = directions(replace(at, time=since), found)[0]
+    return replace(at, time=np.maximum(np.arange(count) - onset, 0)[None] * dt)
+
+
+def _pushes(ports: RigPorts, at: Trajectory, found: Sequence[Candidate]) -> FloatArray:
+    """What each candidate adds at its port for a strength of 1, shape (n, candidates)."""
+    added = directions(at, found)[0]
     names = list(ports.model.outputs)
     places = [names.index(ports.outputs[c.port]) for c in found]
     return np.stack([added[:, place, i] for i, place in enumerate(places)], axis=1)
@@ -182,38 +160,52 @@ def _allowed(
     return allowed
 
 
-def _suspect(best: Candidate, found: Standing) -> Suspect:
-    return Suspect(
-        best.name, best.port, found.p_value, found.explained, best.effect.free, tuple(found.alike)
-    )
-
-
-def _named(
-    rows: Sequence[tuple[Suspect, int]], residual: FloatArray, units: FloatArray
+def _sized(
+    ranked: Sequence[Standing],
+    found: Sequence[Candidate],
+    at: Trajectory,
+    observed: ObservedChange,
 ) -> list[Suspect]:
-    """The first gives the class its name: the one with the fewest parameters of those that do as
-    well as the best. Members of its class that are clearly worse on the samples are dropped.
+    """All of them, those worth a fit before the others, by what each explains."""
+    least = LEAST_SIZED * ranked[0].explained if ranked else 0.0
+    fitted, others = list[Suspect](), list[Suspect]()
+    for place, one in enumerate(ranked):
+        candidate = found[one.index]
+        worth = place < SIZED and one.explained > least
+        explained = sized(at, candidate, one.strength, observed) if worth else one.explained
+        free, family = candidate.effect.free, candidate.effect.family
+        row = Suspect(candidate.name, candidate.port, one.p_value, explained, free, family)
+        (fitted if worth else others).append(row)
+    return sorted(fitted, key=lambda row: -row.explained) + others
+
+
+def _named(rows: Sequence[Suspect], noise: float, error: float) -> list[Suspect]:
+    """The first names the class: the one with the fewest parameters of those that do as well as the
+    best, as far as can be known: its size takes the part of the response's error that is in phase.
+
+    Args:
+        rows: those that explain most first.
+        noise: share of the change's energy that is noise.
+        error: of the model's response, relative to the signal.
     """
     if not rows:
         return []
-    top, place = rows[0]
-    left = residual[:, None] - units * (units.T @ residual)
 
-    def rivals(row: Suspect, at: int) -> bool:
-        near = row.explained > top.explained - NEARLY
-        return near or (row.label in top.alike and not _worse(left[:, at], left[:, place]))
+    def left(row: Suspect) -> float:
+        """Amplitude of what it leaves beside the noise, relative to the change."""
+        return float(np.sqrt(max(1.0 - row.explained - noise, 0.0)))
 
-    equals = [row for row, at in rows if rivals(row, at)]
-    near = [row for row in equals if row.explained > top.explained - NEARLY]
-    first = min(near, key=lambda row: row.parameters)
+    best = rows[0]
+
+    def equal(row: Suspect) -> bool:
+        # A filter is described as one of samples or of time; neither is what the rig has.
+        kin = bool(row.family) and (row.family, row.port) == (best.family, best.port)
+        return left(row) <= left(best) + (error if kin else error / np.sqrt(2.0))
+
+    equals = [row for row in rows if equal(row)]
+    first = min(equals, key=lambda row: row.parameters)
     first = replace(first, alike=tuple(row.label for row in equals if row is not first))
-    return [first, *(row for row, _ in rows if row.label != first.label)]
-
-
-def _worse(left: FloatArray, best: FloatArray) -> bool:
-    """Whether one leaves more than the other by more than chance, block by block."""
-    more = [piece.mean() for piece in np.array_split(left**2 - best**2, BLOCKS)]
-    return bool(np.mean(more) > WORSE * np.std(more, ddof=1) / np.sqrt(len(more)))
+    return [first, *(row for row in rows if row.label != first.label)]
 
 
 def in_words(rows: Sequence[Suspect]) -> str:

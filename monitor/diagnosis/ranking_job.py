@@ -51,7 +51,8 @@ def answer(folder: Path) -> str:
     Raises:
         RigwatchError: a file of effects is malformed.
     """
-    from monitor.diagnosis.fault_candidates import Evidence, in_words, suspects
+    from monitor.diagnosis.fault_candidates import in_words, suspects
+    from monitor.diagnosis.observed_change import Evidence
     from rigwatch.physics.engine.equations import library, offered
 
     with np.load(folder / _EVIDENCE) as kept:

@@ -8,7 +8,7 @@ the model's filters carry the effect to the residual:
     leak of a chamber    pressure follows m·a and decays through a leak: -Ge after an integrator
     drive                Ĝ, as from voltage to modelled acceleration; 1/M for an inertia
     reading of the drive the same with opposite sign: it changes the modelled acceleration only
-    accelerometer        no filter
+    accelerometer        no filter; a fault of it acts on what it would read without the change
 """
 
 from collections.abc import Callable, Mapping
@@ -38,6 +38,8 @@ MOST = 2.0
 MOST_FRICTION = 10.0
 """Rms of a force in units of the known friction of commissioning."""
 Response = Callable[[FloatArray], FloatArray]
+_MOTION = ("position", "velocity", "measured", "expected")
+"""Inputs beside the drive: the last two are the acceleration, and that without the change."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +48,7 @@ class RigPorts:
 
     Attributes:
         model: a model without states: its inputs are measured, each of its ports has an output.
-        inputs: shape (samples, inputs).
+        inputs: of the model, shape (samples, inputs).
         outputs: output of each port, by port.
         responses: from that output to the change of the residual [m/s^2], by port.
         known: the part of the change that is healthy [m/s^2], shape (samples,).
@@ -61,21 +63,24 @@ class RigPorts:
     limits: Mapping[str, float]
 
 
-def rig_ports(model: RigModel, signals: FloatArray) -> RigPorts:
+def rig_ports(model: RigModel, signals: FloatArray, change: FloatArray) -> RigPorts:
     """The ports of a rig.
 
     Args:
         model: the current model.
         signals: its channels, finite, shape (samples, channels).
+        change: of the residual [m/s^2], finite, shape (samples,).
     """
     if isinstance(model.plant, InertiaPlant):
-        return _inertia(model, model.plant, signals)
+        return _inertia(model, model.plant, signals, change)
     if not isinstance(model.plant, TransferPlant):
         raise ModelError("the model is one of equations: rank effects with rigwatch explain")
-    return _transfer(model, model.plant, signals)
+    return _transfer(model, model.plant, signals, change)
 
 
-def _transfer(model: RigModel, plant: TransferPlant, signals: FloatArray) -> RigPorts:
+def _transfer(
+    model: RigModel, plant: TransferPlant, signals: FloatArray, change: FloatArray
+) -> RigPorts:
     columns = TransferResidual(model).update(signals, np.zeros(len(signals), np.int64))
     against = model.friction.function().simulate
     integrator = velocity_filter(
@@ -92,7 +97,7 @@ def _transfer(model: RigModel, plant: TransferPlant, signals: FloatArray) -> Rig
     outputs = made | {"voltage_sensor": "voltage_read", "acceleration_sensor": "acceleration_read"}
     return RigPorts(
         _static("voltage", ports, outputs),
-        columns[:, [VOLTAGE, POSITION, VELOCITY, ACCELERATION]],
+        _inputs(columns, change),
         outputs,
         {
             "load": lambda push: -against(push),
@@ -111,10 +116,12 @@ def _transfer(model: RigModel, plant: TransferPlant, signals: FloatArray) -> Rig
     )
 
 
-def _inertia(model: RigModel, plant: InertiaPlant, signals: FloatArray) -> RigPorts:
+def _inertia(
+    model: RigModel, plant: InertiaPlant, signals: FloatArray, change: FloatArray
+) -> RigPorts:
     columns = InertiaResidual(model).update(signals, np.zeros(len(signals), np.int64))
     assert model.band is not None
-    healthy = np.mean([model.band.low, model.band.high], axis=0)
+    known = columns[:, [G1, G2]] @ np.mean([model.band.low, model.band.high], axis=0)
     ports = {
         "load": Port(kind="force", unit="1", variables=_motion("force")),
         "drive": Port(kind="actuator", signal="force"),
@@ -126,7 +133,7 @@ def _inertia(model: RigModel, plant: InertiaPlant, signals: FloatArray) -> RigPo
     }  # fmt: skip
     return RigPorts(
         _static("force", ports, outputs),
-        columns[:, [VOLTAGE, POSITION, VELOCITY, ACCELERATION]],
+        _inputs(columns, change - known),
         outputs,
         {
             "load": lambda push: push / plant.mass,
@@ -134,7 +141,7 @@ def _inertia(model: RigModel, plant: InertiaPlant, signals: FloatArray) -> RigPo
             "force_sensor": lambda push: -push / plant.mass,
             "acceleration_sensor": lambda push: push,
         },
-        columns[:, [G1, G2]] @ healthy,
+        known,
         {
             "load": MOST * _rms(columns[:, VOLTAGE]),
             "drive": MOST * _rms(columns[:, VOLTAGE]),
@@ -144,17 +151,23 @@ def _inertia(model: RigModel, plant: InertiaPlant, signals: FloatArray) -> RigPo
     )
 
 
+def _inputs(columns: FloatArray, change: FloatArray) -> FloatArray:
+    """The drive and `_MOTION`, shape (samples, 5)."""
+    measured = columns[:, [VOLTAGE, POSITION, VELOCITY, ACCELERATION]]
+    return np.column_stack([measured, columns[:, ACCELERATION] - change])
+
+
 def _rms(signal: FloatArray) -> float:
     return float(np.sqrt(np.mean(signal**2)))
 
 
 def _static(drive: str, ports: dict[str, Port], outputs: Mapping[str, str]) -> Model:
     """A model whose outputs are its ports."""
-    read = {f"{drive}_read": drive, "acceleration_read": "measured"}
+    read = {f"{drive}_read": drive, "acceleration_read": "expected"}
     return Model(
         name="ports of a rig",
         summary="what effects at a rig's ports see and push",
-        inputs={name: Input(unit="1") for name in (drive, "position", "velocity", "measured")},
+        inputs={name: Input(unit="1") for name in (drive, *_MOTION)},
         parameters={},
         outputs={
             name: Output(unit="1", expression=read.get(name, name)) for name in outputs.values()

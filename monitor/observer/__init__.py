@@ -22,7 +22,7 @@ from monitor.observer.decision_state import (
     DecisionRules,
     new_state,
 )
-from monitor.observer.lagged_motion import EMPTY
+from monitor.observer.lagged_motion import EMPTY, MATCHED, motion_kernel
 from monitor.observer.missing_force import (
     DISAGREE,
     DRY_UNIT,
@@ -63,6 +63,7 @@ __all__ = [
     "DRY_UNIT",
     "EMPTY",
     "LASTING",
+    "MATCHED",
     "MEASURED",
     "MEDIUM",
     "OUTPUTS",
@@ -97,6 +98,7 @@ __all__ = [
     "high_pass",
     "layout_of",
     "levels",
+    "motion_kernel",
     "new_state",
     "no_remainder",
     "range_of",

@@ -50,7 +50,7 @@ class FixedLag:
         fills: bool = True,
     ) -> None:
         self._fills = fills
-        kernels = [_kernel(column.order, half_width, rate, late) for column in columns]
+        kernels = [motion_kernel(column.order, half_width, rate, late) for column in columns]
         self._kernels = np.array(kernels)
         self._channels = np.array([column.channel for column in columns])
         self._ring = np.zeros((2 * half_width + 1, int(self._channels.max()) + 1))
@@ -75,8 +75,8 @@ EMPTY, FIRST, WHOLE, TAINTED = 0, 1, 2, 3
 """States of a sample, see `FixedLag.update`."""
 
 
-def _kernel(order: int, half_width: int, rate: float, late: float) -> FloatArray:
-    """Weights, oldest sample first, shape (2·half_width + 1,)."""
+def motion_kernel(order: int, half_width: int, rate: float, late: float = 0.0) -> FloatArray:
+    """Weights of a column of this order, oldest sample first, shape (2·half_width + 1,)."""
     width = 2 * half_width + 1
     if order == DELAY:
         return np.asarray(np.eye(width)[half_width], np.float64)

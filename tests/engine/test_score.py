@@ -12,8 +12,9 @@ from rigwatch.physics.engine.fit.recording import Recording, windows
 from rigwatch.physics.engine.fit.windowed_fit import fit
 from rigwatch.physics.engine.score.candidates import Candidate, root_mean_square, shaped
 from rigwatch.physics.engine.score.compatibility import suits
-from rigwatch.physics.engine.score.effect_sensitivities import directions, trajectory
+from rigwatch.physics.engine.score.effect_sensitivities import directions
 from rigwatch.physics.engine.score.score_test import Projector, score
+from rigwatch.physics.engine.score.trajectory import trajectory
 
 MODEL = shipped_models()["mass-spring-damper"]
 DT = 1 / 256

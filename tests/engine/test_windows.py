@@ -10,7 +10,8 @@ from rigwatch.physics.engine.equations.system import Placement, compose
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.physics.engine.fit.windowed_fit import evaluate, fit
 from rigwatch.physics.engine.score.candidates import shaped
-from rigwatch.physics.engine.score.effect_sensitivities import directions, trajectory
+from rigwatch.physics.engine.score.effect_sensitivities import directions
+from rigwatch.physics.engine.score.trajectory import trajectory
 from rigwatch.wire.typed_files.loading import parse
 
 DT, N, HORIZON, RATE, FAST = 1 / 256, 1024, 128, 60.0, 50.0

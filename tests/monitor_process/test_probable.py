@@ -8,7 +8,8 @@ import pytest
 from msgspec import structs
 
 from monitor.diagnosis.background_ranking import Explainer
-from monitor.diagnosis.fault_candidates import Evidence, Suspect, in_words, suspects
+from monitor.diagnosis.fault_candidates import Suspect, in_words, suspects
+from monitor.diagnosis.observed_change import Evidence
 from monitor.diagnosis.ranking_job import ask
 from monitor.model.model_file import RigModel, load_model
 from monitor.pipeline.pipeline import Monitor

@@ -1,8 +1,9 @@
 """Which effect is missing, to first order: the score test of candidates along a fitted model.
 
 `candidates` lists effects at compatible ports, `effect_sensitivities` computes their influence on
-the outputs, `score_test` the share of the residual that each explains, `significance` corrects for
-the number of candidates, `ranking` selects the best shapes and forms classes of similar effects.
+the outputs along a `trajectory`, `finite_effects` what one of finite size adds there, `score_test`
+the share of the residual that each explains, `significance` corrects for the number of candidates,
+`ranking` selects the best shapes and forms classes of similar effects.
 """
 
 from rigwatch.physics.engine.score.autocorrelation import (
@@ -18,7 +19,8 @@ from rigwatch.physics.engine.score.candidates import (
     sizes_at_port,
 )
 from rigwatch.physics.engine.score.compatibility import has_variables, possible, suits
-from rigwatch.physics.engine.score.effect_sensitivities import directions, trajectory
+from rigwatch.physics.engine.score.effect_sensitivities import directions
+from rigwatch.physics.engine.score.finite_effects import finite_effect
 from rigwatch.physics.engine.score.ranking import Standing, cosines_with, freed, standings
 from rigwatch.physics.engine.score.score_test import (
     ALIKE,
@@ -29,6 +31,7 @@ from rigwatch.physics.engine.score.score_test import (
     score,
 )
 from rigwatch.physics.engine.score.significance import corrected_p_values
+from rigwatch.physics.engine.score.trajectory import Trajectory, trajectory
 
 __all__ = [
     "ALIKE",
@@ -36,6 +39,7 @@ __all__ = [
     "Projector",
     "Scores",
     "Standing",
+    "Trajectory",
     "alone",
     "autocorrelation",
     "best_of",
@@ -44,6 +48,7 @@ __all__ = [
     "correlation_time",
     "cosines_with",
     "directions",
+    "finite_effect",
     "first_below",
     "freed",
     "has_variables",

@@ -10,84 +10,23 @@ sensor the effect changes only its own output.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
-import sympy
 
 from rigwatch.physics.engine.compile import (
-    CompiledSystem,
     Linearisation,
     derivative,
     numpy_function,
     on_all_cores,
     shares,
 )
-from rigwatch.physics.engine.equations import (
-    LEFT,
-    PROBE,
-    RATE,
-    STEP,
-    TIME,
-    UNTIL,
-    System,
-    hold_at,
-    parse,
-    symbol,
-)
-from rigwatch.physics.engine.fit import EffectStates
+from rigwatch.physics.engine.equations import PROBE, System, hold_at, parse, symbol
 from rigwatch.physics.engine.score.candidates import Candidate
+from rigwatch.physics.engine.score.trajectory import Trajectory, memory, port_signals
 from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
 from rigwatch.wire.kernel import kernel
-
-
-@dataclass(frozen=True, eq=False)
-class Trajectory:
-    """A linearised run with the signals at its ports.
-
-    Attributes:
-        compiled: the model.
-        run: its linearisation.
-        inputs: at the nodes, shape (windows, nodes, inputs).
-        time: at the nodes, shape (windows, nodes) [s].
-        parameters: all of them, shape (n_p,).
-    """
-
-    compiled: CompiledSystem
-    run: Linearisation
-    inputs: FloatArray
-    time: FloatArray
-    parameters: FloatArray
-
-
-def trajectory(
-    compiled: CompiledSystem,
-    inputs: FloatArray,
-    dt: float,
-    starts: IntArray,
-    length: int,
-    *,
-    initial: FloatArray,
-    parameters: FloatArray,
-    substeps: int = 4,
-) -> Trajectory:
-    """The run of `CompiledSystem.linearise` with inputs and time at its nodes."""
-    run = compiled.linearise(
-        inputs, dt, starts, length, initial=initial, parameters=parameters, substeps=substeps
-    )
-    nodes = np.arange(run.states.shape[1])
-    row, place = nodes // substeps, (nodes % substeps) / substeps
-    rows = starts[:, None] + row
-    following = np.minimum(rows + 1, len(inputs) - 1)
-    model = compiled.system.model
-    share = np.outer(place, [model.held(name) == "linear" for name in model.inputs])
-    late = np.array([own.late for own in model.inputs.values()])
-    before = (place[:, None] < late) & (share == 0.0) & (late > 0)
-    kept = np.where(before, inputs[np.maximum(rows - 1, 0)], inputs[rows])
-    at_nodes = kept + share * (inputs[following] - inputs[rows])
-    return Trajectory(compiled, run, at_nodes, (rows + place) * dt, parameters)
 
 
 def directions(at: Trajectory, candidates: Sequence[Candidate]) -> FloatArray:
@@ -95,7 +34,7 @@ def directions(at: Trajectory, candidates: Sequence[Candidate]) -> FloatArray:
     system, run = at.compiled.system, at.run
     kinds = {name: port.kind for name, port in system.model.ports.items()}
     inner = [c for c in candidates if kinds[c.port] != "sensor"]
-    seen = {port: _signals(at, port) for port in {c.port for c in candidates}}
+    seen = {port: port_signals(at, port) for port in {c.port for c in candidates}}
     found = np.zeros((*run.outputs.shape, len(candidates)))
     if inner:
         pushes = _pushes(at, inner, seen)
@@ -144,11 +83,11 @@ def _ready(
     effect, values = candidate.effect, _neutral_values(candidate)
     text = (effect.expression, effect.direction, effect.strength)
     function, used = _push_function(*text, tuple(names))
-    states = _memory(at, candidate, signals) if used & set(effect.states) else None
+    states = memory(at, candidate, signals) if used & set(effect.states) else None
 
     def pushed() -> Any:
-        memory = _at_nodes(at, states.run(values)) if states else {}
-        known = {**dict.fromkeys(names, 0.0), **signals, **memory, **values}
+        remembered = states(values) if states else {}
+        known = {**dict.fromkeys(names, 0.0), **signals, **remembered, **values}
         return function(*(known[name] for name in names))
 
     return pushed
@@ -166,74 +105,6 @@ def _push_function(
         found = derivative(parse(expression, symbols, "effect"), symbols[strength])
     used = frozenset(s.name for s in found.free_symbols)
     return numpy_function(names, found), used
-
-
-def _signals(at: Trajectory, port_name: str) -> dict[str, FloatArray]:
-    """Signals at an effect's port, at the nodes, each of shape (windows, nodes)."""
-    system = at.compiled.system
-    port = system.model.ports[port_name]
-    signals = {TIME: at.time}
-    for name, variable in port.variables.items():
-        expression = parse(variable.expression, _symbols(system), f"port {port_name}")
-        signals[name] = _along(at, expression)
-    if port.kind != "force":
-        signals["u"] = _along(at, system.ports[port_name])
-        signals[RATE] = np.gradient(signals["u"], at.run.spacing, axis=1)
-        signals[STEP] = _step(signals["u"], at.run.substeps)
-        held = port.kind == "sensor" or hold_at(system.model, port) == "zero"
-        signals[LEFT] = held * _left(at)
-    return signals
-
-
-def _step(signal: FloatArray, substeps: int) -> FloatArray:
-    """Change of a signal over the last sample, shape (windows, nodes)."""
-    changed = np.zeros_like(signal)
-    changed[:, substeps:] = signal[:, substeps:] - signal[:, :-substeps]
-    # The signal before a window is unknown: its first change is extrapolated.
-    changed[:, :substeps] = changed[:, substeps : 2 * substeps][:, :substeps]
-    return changed
-
-
-def _symbols(system: System) -> dict[str, sympy.Expr]:
-    names = (*system.states, *system.parameters, *system.model.inputs, TIME)
-    return {name: symbol(name) for name in names} | dict(system.ports)
-
-
-def _along(at: Trajectory, expression: sympy.Expr) -> FloatArray:
-    """An expression in the system's variables, along the trajectory."""
-    system = at.compiled.system
-    values: dict[str, Any] = dict(zip(system.parameters, at.parameters.tolist(), strict=True))
-    values |= dict.fromkeys(system.probes, 0.0) | {TIME: at.time, UNTIL: _left(at)}
-    values |= dict(zip(system.states, np.moveaxis(at.run.states, -1, 0), strict=True))
-    values |= dict(zip(system.model.inputs, np.moveaxis(at.inputs, -1, 0), strict=True))
-    found = numpy_function(list(values), expression)(*values.values())
-    return np.broadcast_to(np.asarray(found, np.float64), at.time.shape)
-
-
-def _left(at: Trajectory) -> FloatArray:
-    """Time until held inputs change, at the nodes, shape (windows, nodes) [s]."""
-    model = at.compiled.system.model
-    kept = any(model.held(name) == "zero" for name in model.inputs)
-    substep = np.arange(at.time.shape[1]) % at.run.substeps
-    return np.broadcast_to(kept * at.run.spacing * (at.run.substeps - substep), at.time.shape)
-
-
-def _memory(at: Trajectory, candidate: Candidate, signals: dict[str, FloatArray]) -> EffectStates:
-    """The effect's own states at strength zero, driven by the signals at its port.
-
-    One run covers all windows: each window continues from the end of the previous one, whose last
-    sample is held for one sample period.
-    """
-    more = ((0, 0), (0, at.run.substeps - 1))
-    along = {name: np.pad(signal, more, mode="edge").ravel() for name, signal in signals.items()}
-    model = at.compiled.system.model
-    hold = hold_at(model, model.ports[candidate.port])
-    return EffectStates(candidate.effect, along, at.run.spacing, hold, at.run.substeps)
-
-
-def _at_nodes(at: Trajectory, found: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    windows, nodes = at.time.shape
-    return {name: state.reshape(windows, -1)[:, :nodes] for name, state in found.items()}
 
 
 def _neutral_values(candidate: Candidate) -> dict[str, float]:
