@@ -43,6 +43,8 @@ EXPLAINED = 0.5
 """Share of the change's energy below which the best effect is rejected."""
 SIZED, LEAST_SIZED = 24, 0.3
 """Number of effects that are fitted, and what each has to explain of what the best explains."""
+UNSURE = 0.25
+"""Share of what the best effect leaves by which others may leave more and be as likely."""
 FEWEST = 64
 """Fewest samples for a ranking."""
 
@@ -181,7 +183,10 @@ def _sized(
 
 def _named(rows: Sequence[Suspect], noise: float, error: float) -> list[Suspect]:
     """The first names the class: the one with the fewest parameters of those that do as well as the
-    best, as far as can be known: its size takes the part of the response's error that is in phase.
+    best, as far as can be known.
+
+    Of a response's error an effect's size takes the part that is in phase; the rest is left. Where
+    even the best leaves more than that, a share of what it leaves counts.
 
     Args:
         rows: those that explain most first.
@@ -196,11 +201,12 @@ def _named(rows: Sequence[Suspect], noise: float, error: float) -> list[Suspect]
         return float(np.sqrt(max(1.0 - row.explained - noise, 0.0)))
 
     best = rows[0]
+    unsure = max(error / np.sqrt(2.0), UNSURE * left(best))
 
     def equal(row: Suspect) -> bool:
         # A filter is described as one of samples or of time; neither is what the rig has.
         kin = bool(row.family) and (row.family, row.port) == (best.family, best.port)
-        return left(row) <= left(best) + (error if kin else error / np.sqrt(2.0))
+        return left(row) <= left(best) + (max(error, unsure) if kin else unsure)
 
     equals = [row for row in rows if equal(row)]
     first = min(equals, key=lambda row: row.parameters)
