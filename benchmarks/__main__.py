@@ -9,6 +9,7 @@ import importlib
 import json
 import os
 import platform
+import signal
 import sys
 import time
 from dataclasses import asdict
@@ -65,6 +66,8 @@ def main() -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the commands do
     if unknown := set(arguments.names) - set(modules()):
         parser.error(f"no benchmark {', '.join(sorted(unknown))}; there are {', '.join(modules())}")
+    # A benchmark that is asked to end ends the processes that it has started.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     results = {name: measure(name, arguments.quick) for name in arguments.names or modules()}
     rows = [row for found in results.values() for row in found]
     print("measured on " + ", ".join(f"{key} {value}" for key, value in machine().items()) + "\n")

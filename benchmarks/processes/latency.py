@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.processes.live_rig import LiveRig, live_rig
+from rigwatch.wire.host.ending import set_at_signal
 from rigwatch.wire.host.realtime import MONITOR, prepare_for_real_time, raise_priority
 from tools.benchmark_table import Row
 
@@ -29,6 +30,8 @@ PERIOD_MS = 1000.0 / 256.0
 TLS_BAR_MS = 5.0
 WARM_UP = 2.0
 """Start-up time that is not counted [s]."""
+ENDS_WITHIN = 30.0
+"""Longest end of a process that writes its figures [s]."""
 
 
 def run(quick: bool) -> list[Row]:
@@ -82,7 +85,7 @@ def measure(rig: LiveRig, seconds: float) -> tuple[NDArray[np.float64], NDArray[
     time.sleep(seconds + WARM_UP)
     for process in (device, jitter):
         process.send_signal(signal.SIGTERM)
-        process.wait()
+        process.wait(ENDS_WITHIN)
     time.sleep(0.5)
     rig.close()
     return matched(np.load(sent), np.load(got), np.load(late))
@@ -181,9 +184,7 @@ ROLES = {"device": device, "subscriber": subscriber, "jitter": jitter}
 
 def main(role: str, config: str, out: str) -> None:
     """One of the processes of the measurement."""
-    stop = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
+    stop = set_at_signal()
     raise_priority(MONITOR)
     ROLES[role](Path(config), Path(out), stop)
 

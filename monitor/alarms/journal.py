@@ -7,6 +7,7 @@ has no newline or is not valid JSON: reading skips and counts it, and writing co
 line. Non-finite numbers are written as the strings "nan", "inf" and "-inf".
 """
 
+import errno
 import json
 import math
 import os
@@ -49,37 +50,55 @@ class AlarmJournal:
         self.failure = ""
         self._largest = largest
         self._waiting: list[bytes] = []
+        self._file: int | None = None
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
-            try:
-                self._end_torn_line()
-                sync(self.path.parent)
-                self._newest = _newest(self.path)
-            except OSError:
-                os.close(self._file)
-                raise
+            self._newest = _newest(self.path)
+            self._open()
         except OSError as error:
-            raise SessionError(
-                f"{path}: alarm journal cannot be opened: {reason_of(error)}"
-            ) from error
+            # A disk that has become read-only must not leave the rig unwatched: it can be read.
+            if error.errno != errno.EROFS:
+                raise SessionError(
+                    f"{path}: alarm journal cannot be opened: {reason_of(error)}"
+                ) from error
+            self._fail(error)
+
+    def _open(self) -> int:
+        """Open the file for appending, if it is not open."""
+        if self._file is None:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+            try:
+                self._end_torn_line(file)
+                sync(self.path.parent)
+            except OSError:
+                os.close(file)
+                raise
+            self._file = file
+        return self._file
+
+    def _fail(self, error: OSError) -> None:
+        self.failure = f"{self.path}: alarm journal cannot be written: {reason_of(error)}"
 
     def write(self, records: Iterable[AlarmRecord]) -> None:
-        """Append records and force them to disk; a full disk only sets `failure`."""
+        """Append records and force them to disk; a full or read-only disk only sets `failure`.
+
+        After a failure call it again, also without records.
+        """
         for record in records:
             self._waiting.append(_line(record))
             self._newest[record.alarm.name] = record
-        if not self._waiting:
+        if not (self._waiting or self.failure):
             return
         try:
-            if not os.fstat(self._file).st_nlink:
-                self._begin_anew()
-            _write_all(self._file, self._waiting)
-            os.fsync(self._file)
-            if os.fstat(self._file).st_size > self._largest:
+            file = self._open()
+            if not os.fstat(file).st_nlink:
+                file = self._begin_anew()
+            _write_all(file, self._waiting)
+            os.fsync(file)
+            if os.fstat(file).st_size > self._largest:
                 self._rotate()
         except OSError as error:
-            self.failure = f"{self.path}: alarm journal cannot be written: {reason_of(error)}"
+            self._fail(error)
             return
         self.failure = ""
 
@@ -103,15 +122,17 @@ class AlarmJournal:
             raise
         self._take(beside, file)
 
-    def _begin_anew(self) -> None:
+    def _begin_anew(self) -> int:
         """Somebody has removed the file: what is written to it now would be lost without an error.
 
         A file that has come in its place, as of a backup, is set aside.
         """
         if self.path.exists():
             self.path.replace(self.path.with_name(f"{self.path.name}.set-aside"))
-        self._take(*self._fresh())
+        beside, file = self._fresh()
+        self._take(beside, file)
         self._waiting.clear()  # the newest of each alarm is there
+        return file
 
     def _fresh(self) -> tuple[Path, int]:
         """A file beside the journal that holds the newest record of each alarm, and open."""
@@ -133,7 +154,7 @@ class AlarmJournal:
         except OSError:
             os.close(file)
             raise
-        os.close(self._file)
+        self.close()
         self._file = file
         sync(self.path.parent)
 
@@ -142,13 +163,15 @@ class AlarmJournal:
 
     def close(self) -> None:
         """Close the file; unwritten lines are lost."""
-        os.close(self._file)
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None
 
-    def _end_torn_line(self) -> None:
+    def _end_torn_line(self, file: int) -> None:
         """Terminate a torn line with the next write, as there may be no space for it now."""
-        size = os.fstat(self._file).st_size
-        if size and os.pread(self._file, 1, size - 1) != b"\n":
-            self._waiting.append(b"\n")
+        size = os.fstat(file).st_size
+        if size and os.pread(file, 1, size - 1) != b"\n":
+            self._waiting.insert(0, b"\n")
 
 
 def _newest(path: Path) -> dict[str, AlarmRecord]:

@@ -84,16 +84,24 @@ def stored_position(data: bytes) -> tuple[int, int] | None:
 def _opened(path: Path) -> tuple[mmap.mmap, int | None]:
     """The mapped file and its number.
 
-    Plain memory and None on a full disk, where writing to a mapping kills the process.
+    Plain memory and None on a full disk, where writing to a mapping kills the process, and on one
+    that is read-only.
     """
+    try:
+        return _mapped(path)
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EROFS):
+            raise
+    memory = mmap.mmap(-1, _SIZE)
+    with contextlib.suppress(OSError):
+        memory[:] = path.read_bytes()[:_SIZE].ljust(_SIZE, b"\0")
+    return memory, None
+
+
+def _mapped(path: Path) -> tuple[mmap.mmap, int]:
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a+b") as opened:
         opened.truncate(_SIZE)
         file = opened.fileno()
-        try:
-            os.posix_fallocate(file, 0, _SIZE)
-        except OSError as error:
-            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
-                raise
-            return mmap.mmap(-1, _SIZE), None
+        os.posix_fallocate(file, 0, _SIZE)
         return mmap.mmap(file, _SIZE), os.fstat(file).st_ino

@@ -305,7 +305,8 @@ class MonitorProcess:
         state = "unsuitable" if self._unsuitable else "stale" if stale else "running"
         text = self._unsuitable or ("no samples arrive" if stale else "")
         if self._journal and self._journal.failure:
-            text = self._journal.failure
+            self._journal.write(())  # what waits is not on the disk before that
+            text = self._journal.failure or text
         extra = {
             "queue_length": float(len(self.reader)),
             "rejected": float(self.reader.rejected),

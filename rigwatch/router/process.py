@@ -10,7 +10,7 @@ from rigwatch.router.report import RouterReport
 from rigwatch.wire.access import REGISTER, access_settings
 from rigwatch.wire.bus import Close, open_router
 from rigwatch.wire.errors import BusError, KeysError
-from rigwatch.wire.host import Heartbeat
+from rigwatch.wire.host import Heartbeat, use_few_pools
 from rigwatch.wire.rig_config import RigConfig
 
 TURN = 0.25
@@ -93,6 +93,7 @@ def run(config: RigConfig, stop: threading.Event) -> None:
     Raises:
         RigwatchError: the address is taken, or there are no valid keys.
     """
+    use_few_pools()
     refusals = RefusalLog()
     if config.bus.security.keys:
         refusals.open()

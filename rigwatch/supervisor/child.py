@@ -64,7 +64,8 @@ class Child:
             stdout=writing,
             stderr=writing,
             process_group=0,
-            preexec_fn=_die_with_parent,  # noqa: PLW1509 (it takes no lock that another thread may hold)
+            # It takes no lock that another thread may hold.
+            preexec_fn=partial(die_with, os.getpid()),  # noqa: PLW1509
         )
         os.close(writing)
 
@@ -143,6 +144,8 @@ class Child:
         Path(self._address).unlink(missing_ok=True)
 
 
-def _die_with_parent() -> None:
+def die_with(supervisor: int) -> None:
     """Runs in the new process: a killed supervisor leaves no orphans that hold its ports."""
     _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != supervisor:  # it was killed before that: no signal will come
+        os._exit(1)

@@ -3,13 +3,15 @@
 A query is asked at the very moment at which a client may first get an answer.
 """
 
+import errno
+import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from monitor.alarms import AlarmJournal, AlarmRecord, Occasion
+from monitor.alarms import AlarmJournal, AlarmRecord, Occasion, read_journal
 from monitor.alarms.kinds import REPORTED
 from rigwatch.wire.bus import Bus, Close, ask_alarm_list
 from rigwatch.wire.bus.commands.alarm_list import KEY
@@ -87,3 +89,21 @@ def test_conditions_that_no_sample_shows_are_all_in_the_table(bench: Bench) -> N
     """Else the first sample after a restart would clear such an alarm."""
     reports = bench.monitor._reports(bench.monitor._seen())
     assert {name for name, _, _ in reports} == REPORTED
+
+
+def test_what_a_full_disk_kept_back_is_written_although_no_alarm_changes(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    def written() -> bool:
+        bench.monitor.look_around()
+        records, _ = read_journal(tmp_path / "alarms.jsonl")
+        return "disk" in [record.alarm.name for record in records]
+
+    bench.monitor.look_around()
+    with monkeypatch.context() as failing:
+        failing.setattr(os, "write", full)
+        raise_disk(bench)
+    eventually(written, "the alarm is in the journal")

@@ -1,4 +1,4 @@
-"""Recorder and witness, which run for a year, keep their memory in few pools."""
+"""Recorder, router and witness, which run for a year, keep their memory in few pools."""
 
 import subprocess
 import sys
@@ -12,7 +12,7 @@ from tests.bus.rig import CONFIG
 POOLS_OF_EIGHT_THREADS = """
 import contextlib, ctypes, sys, threading
 from pathlib import Path
-from rigwatch import recorder, witness
+from rigwatch import recorder, router, witness
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.rig_config import load_rig
 
@@ -45,6 +45,7 @@ barrier.wait()
         "recorder.run(Path('none.toml'), stop)",
         "recorder.run_several([Path('none.toml')], stop)",
         "witness.run(load_rig(sys.argv[1]), stop)",
+        "router.run(load_rig(sys.argv[1]), stop)",
     ],
 )
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="pools are those of glibc")

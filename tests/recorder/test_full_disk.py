@@ -124,3 +124,49 @@ def test_recording_goes_on_when_a_full_disk_has_room_again(tmp_path: Path) -> No
     assert found["whole"]
     assert (found["lost"], found["dropped"]) == (0, 0)
     assert found["segments"] >= 2
+
+
+READ_ONLY = """
+import json, subprocess, sys
+from pathlib import Path
+from monitor.alarms import AlarmJournal, AlarmManager, Occasion, read_journal
+from monitor.process.cursor import Cursor
+
+disk = Path(sys.argv[1])
+journal, alarms = AlarmJournal(disk / "alarms.jsonl"), AlarmManager()
+alarms.report("daq", Occasion(), active=True)
+journal.write(alarms.take_changes())
+before = Cursor(disk / "position")
+before.write(7, 11)
+for one in (journal, before):
+    one.close()
+
+subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
+journal, cursor = AlarmJournal(disk / "alarms.jsonl"), Cursor(disk / "position")
+restored = [one.alarm.name for one in journal.newest()]
+alarms.report("disk", Occasion(), active=True)
+journal.write(alarms.take_changes())
+failed, position = journal.failure, cursor.read()
+cursor.write(7, 12)
+
+subprocess.run(["mount", "-o", "remount,rw", disk], check=True)
+journal.write(())
+cursor.keep()
+kept = [one.alarm.name for one in read_journal(disk / "alarms.jsonl")[0]]
+again = Cursor(disk / "position").read()
+print(json.dumps([restored, failed, position, journal.failure, kept, again]))
+"""
+
+
+def test_a_monitor_starts_on_a_disk_that_has_become_read_only(tmp_path: Path) -> None:
+    if shutil.which("unshare") is None or in_small_disk(tmp_path, "").returncode:
+        pytest.skip("no mount namespaces for users here")
+    done = in_small_disk(tmp_path, READ_ONLY)
+    assert done.returncode == 0, done.stderr
+    restored, failed, position, failure, kept, again = json.loads(done.stdout)
+    assert restored == ["daq"]
+    assert position == [7, 11]
+    assert "the disk is read-only" in failed
+    assert failure == ""
+    assert kept == ["daq", "disk"]
+    assert again == [7, 12]

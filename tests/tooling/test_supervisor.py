@@ -2,15 +2,18 @@
 
 import os
 import signal
+import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from rigwatch.supervisor import supervisor
+from rigwatch.supervisor.child import die_with
 from rigwatch.supervisor.plan import ProcessPlan
 from rigwatch.supervisor.supervisor import ProcessEvent, Supervisor, how_it_ended
 from rigwatch.supervisor.vitals import Limits, Vitals
@@ -191,6 +194,12 @@ def test_a_source_that_has_just_come_back_gives_its_readers_time() -> None:
     source.take("X_RIGWATCH_COUNT=7", now=100.9)
     reader.take("X_RIGWATCH_COUNT=5", now=101.6)
     assert "takes no samples" in reader.complaint(source, 101.6, LIMITS)
+
+
+def test_a_process_whose_supervisor_was_killed_while_it_started_does_not_start() -> None:
+    late = partial(die_with, os.getpid() + 1)
+    started = subprocess.run([sys.executable, "-c", ""], check=False, preexec_fn=late)
+    assert started.returncode == 1
 
 
 def test_exit_codes_in_words() -> None:

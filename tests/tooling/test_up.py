@@ -21,7 +21,7 @@ from rigwatch.wire.host.ports import endpoint_address, free_port
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.typed_files.shipped import find_config
 from sim_plant.serve import ControlServer, control_path
-from tests.waiting import eventually
+from tests.waiting import eventually, runs
 
 pytestmark = pytest.mark.xdist_group("rig")
 WITHOUT = ["--without", "monitor", "--without", "recorder", "--without", "dashboard"]
@@ -138,16 +138,7 @@ def test_no_process_outlives_a_supervisor_that_was_killed(rig: Rig) -> None:
     rig.wait_for("ready", process="plant")
     pids = [event["pid"] for event in rig.events if event["event"] == "started"]
     rig.process.kill()
-    eventually(lambda: not any(_runs(pid) for pid in pids), "every process has ended")
-
-
-def _runs(pid: int) -> bool:
-    try:
-        status = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8")
-    except OSError:
-        return False
-    # Where nobody adopts and reaps orphans, an ended one stays as a zombie.
-    return status.rpartition(")")[2].split()[0] != "Z"
+    eventually(lambda: not any(runs(pid) for pid in pids), "every process has ended")
 
 
 def test_beside_a_rig_that_is_up_another_gets_ports_and_a_name_of_its_own(

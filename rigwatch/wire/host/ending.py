@@ -1,19 +1,59 @@
-"""Signals as events: SIGINT and SIGTERM end a process in order, SIGHUP renews its configuration."""
+"""Signals as events: SIGINT and SIGTERM end a process in order, SIGHUP renews its configuration.
 
+    signal ─▶ handler, within whatever the main thread does ─▶ new thread ─▶ event
+
+A handler must not set an event itself: it interrupts the main thread, which may hold the event's
+own lock because it is waiting for the event, and would then wait for itself for ever.
+"""
+
+import _thread
+import contextlib
+import os
 import signal
 import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+PATIENCE = 8.0
+"""Longest orderly end of a process whose supervisor is gone; as long as a supervisor waits [s]."""
 
 
 def set_at_signal(stop: threading.Event | None = None) -> threading.Event:
-    """Let SIGINT and SIGTERM set `stop`, or a new event, and return it; for the main thread."""
-    event = stop or threading.Event()
+    """Let SIGINT and SIGTERM set `stop`, or a new event, and return it; for the main thread.
+
+    If its supervisor no longer lives, nobody would kill a process that hangs: it kills itself then.
+    """
+    event, parent = stop or threading.Event(), os.getppid()
+
+    def end() -> None:
+        event.set()
+        if os.environ.get("NOTIFY_SOCKET"):
+            _end_if_orphaned(parent)
+
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: event.set())
+        signal.signal(number, _in_a_thread(end))
     return event
 
 
 def set_at_hangup() -> threading.Event:
     """A new event that SIGHUP sets; for the main thread."""
     event = threading.Event()
-    signal.signal(signal.SIGHUP, lambda *_: event.set())
+    signal.signal(signal.SIGHUP, _in_a_thread(event.set))
     return event
+
+
+def _in_a_thread(act: Callable[[], None]) -> Callable[..., Any]:
+    """A handler that acts in a new thread: `threading.Thread` takes locks, this takes none."""
+
+    def handle(*_: object) -> None:
+        with contextlib.suppress(RuntimeError):  # the interpreter is already ending
+            _thread.start_new_thread(act, ())
+
+    return handle
+
+
+def _end_if_orphaned(parent: int) -> None:
+    time.sleep(PATIENCE)
+    if os.getppid() != parent:
+        os.kill(os.getpid(), signal.SIGKILL)
