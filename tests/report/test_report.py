@@ -15,7 +15,7 @@ from rigwatch.page.svg import Plot
 from rigwatch.workbench.explain.verdict_calibration import LATER_COUNTS, later_probability_wrong
 from rigwatch.workbench.fit import Value
 from rigwatch.workbench.report import explanation_lines, next_command
-from rigwatch.workbench.report.html_report import gather
+from rigwatch.workbench.report.html_report import gather, report_html
 from rigwatch.workbench.report.sections import headline
 from rigwatch.workbench.report.text_report import doubt_of
 from rigwatch.workbench.study.study import Study
@@ -102,6 +102,23 @@ def test_its_numbers_are_those_of_compare(
             assert parsed.numbers[f"{channel}.{name}"] == values[name]
     for name, value in found["parameters"].items():
         assert parsed.numbers[name] == value["value"]
+
+
+def test_errors_are_shown_in_the_unit_of_the_verdict_and_kept_in_si(study: Study) -> None:
+    material = gather(study)
+    last = material.stages[-1]
+    channels = {n: replace(c, told_in="mm") for n, c in last.comparison.channels.items()}
+    told = replace(last.comparison, told_in="mm", channels=channels)
+    stages = [*material.stages[:-1], replace(last, comparison=told)]
+    page, parsed = report_html(replace(material, stages=stages)), Page()
+    parsed.feed(page)
+    assert parsed.numbers["held_out_error"] == told.held_out_error
+    shown = f"{1e3 * told.held_out_error:.4g}"
+    assert f'data-name="held_out_error">{shown}</data></b><span>held-out error now [mm]' in page
+    for name in channels:
+        row = page[page.index(f'data-name="{name}.held_out_error"') :].split("</tr>")[0]
+        assert row.startswith(f'data-name="{name}.held_out_error">{shown}<')
+        assert "<td>mm</td>" in row
 
 
 def test_it_tells_the_story(page: tuple[str, Page]) -> None:

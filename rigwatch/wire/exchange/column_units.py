@@ -34,7 +34,7 @@ _USUAL = {
     "m": "m, mm, um, cm, in, ft",
     "m/s": "m/s, mm/s, in/s, km/h",
     "m/s^2": "m/s^2, mm/s^2, g0",
-    "N": "N, mN, kN, lbf, kgf",
+    "N": "N, mN, kN, lbf, kgf, gf",
     "Pa": "Pa, kPa, MPa, bar, mbar, psi",
 }
 AMBIGUOUS = {

@@ -87,7 +87,8 @@ QUANTITIES: tuple[Quantity, ...] = (
     ),
     Quantity(
         "force", "N", {"kg": 1, "m": 1, "s": -2},
-        {"N": 1, "kgf": GRAVITY, "lbf": POUND_FORCE, "kip": 1000 * POUND_FORCE}, ("N",),
+        {"N": 1, "kgf": GRAVITY, "gf": GRAVITY / 1000, "lbf": POUND_FORCE,
+         "kip": 1000 * POUND_FORCE}, ("N",),
     ),
     Quantity("torque", "N m", {"kg": 1, "m": 2, "s": -2}, {"Nm": 1}, ("Nm",)),
     Quantity(

@@ -3,8 +3,8 @@
 write_report(open_study("emps"), Path("emps.html"))
 
 Charts are inline SVG in the page's colours and follow the system's light or dark theme. Numbers are
-stored in full precision in `<data value="…">`, so a program reads the same values as from
-`rigwatch compare --json`.
+stored in full precision and in SI in `<data value="…">`, so a program reads the same values as from
+`rigwatch compare --json`; errors are shown in the unit in which the verdict tells them.
 """
 
 from collections.abc import Callable
