@@ -62,9 +62,14 @@ progress() {
     done
 }
 
+packages_of() {
+    cat "$@" | grep -c '^[A-Za-z0-9]'
+}
+
+echo "setup: $(packages_of "$@") packages, usually about a minute in all, more where the network is slow"
 for lock in "$@"; do
-    packages=$(grep -c '^[A-Za-z0-9]' "$lock")
-    echo "setup: $lock: $packages packages, usually about a minute, more where the network is slow"
+    packages=$(packages_of "$lock")
+    echo "setup: $lock: $packages packages"
     { install "$lock" || { cat "$venv/setup-errors.txt" >&2 && echo "setup failed"; }; } \
         | progress "$packages"
 done

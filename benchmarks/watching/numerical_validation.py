@@ -12,17 +12,18 @@ from numpy.typing import NDArray
 
 from monitor.commissioning.friction_filter import (
     GAMMAS,
-    VALIDATION_ORDERS,
     FrictionFilter,
     fit_friction_filter,
 )
 from monitor.estimation.thesis_thresholds import Thresholds, thesis_thresholds
 from monitor.estimation.window import new_window, windowed_least_squares
+from rigwatch.physics.transfer.output_error import OutputErrorOrders
 from rigwatch.physics.transfer.transfer_function import TransferFunction
 from rigwatch.wire.arrays import FloatArray
 from sim_plant.second_order import FAULT_TIME, NOISE, STEP, Validation, validation
 from tools.benchmark_table import Row
 
+ORDERS = OutputErrorOrders(3, 2, 0)
 WINDOW, HOP = 300, 20
 HEAD, TAIL = 100, 200
 HEALTHY_ESTIMATES = 50
@@ -74,7 +75,7 @@ def known_fault(case: int) -> FrictionFilter:
     velocity = begun * np.mean([steadied(run) for run in runs], axis=0)
     residual = np.mean([_residual(run) for run in runs], axis=0)
     part = slice(int(FAULT_TIME / STEP) - HEAD, -TAIL)
-    known = (velocity[part], residual[part], VALIDATION_ORDERS)
+    known = (velocity[part], residual[part], ORDERS)
     both = fit_friction_filter(*known, GAMMAS, skip=0)
     viscous = fit_friction_filter(*known, GAMMAS[-1:], skip=0, coulomb=0.0)
     return viscous if viscous.explained > both.explained else both

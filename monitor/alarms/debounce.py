@@ -38,12 +38,11 @@ class Debouncer:
     Args:
         persistence: consecutive samples with the condition for the level to rise.
         clear_after: consecutive samples without it for the level to fall.
-        level: level to start from.
     """
 
-    def __init__(self, persistence: int, clear_after: int, *, level: bool = False) -> None:
+    def __init__(self, persistence: int, clear_after: int) -> None:
         self.persistence, self.clear_after = persistence, clear_after
-        self.level = level
+        self.level = False
         self._run = 0
         self._onset_seq = -1
 

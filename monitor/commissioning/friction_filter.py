@@ -21,7 +21,6 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 RIG_ORDERS = OutputErrorOrders(4, 3, 0)
-VALIDATION_ORDERS = OutputErrorOrders(3, 2, 0)
 GAMMAS = tuple(float(gamma) for gamma in np.round(np.arange(0.0, 10.01, 0.2), 1))
 
 

@@ -9,14 +9,16 @@ from rigwatch.wire.arrays import FloatArray
 
 MATCH = 0.006
 """Allowed rms difference of an excitation one period later, as a share of its amplitude."""
+NOISE = 1e-3
+"""Noise of a measured voltage that the period has to allow for [V]."""
 
 
-def period_of(voltage: FloatArray, longest: int, noise: float = 1e-3) -> int:
+def period_of(voltage: FloatArray, longest: int) -> int:
     """Period of the voltage in samples, 0 if it does not repeat within `longest`."""
     swing = float(np.std(voltage))
-    if swing < 10.0 * noise:
+    if swing < 10.0 * NOISE:
         return 0
-    tolerance = (MATCH * swing) ** 2 + (3.0 * noise) ** 2
+    tolerance = (MATCH * swing) ** 2 + (3.0 * NOISE) ** 2
     lags = range(4, min(voltage.size // 2, longest) + 1)
     return shortest_period(voltage, lags, lambda _: tolerance)
 

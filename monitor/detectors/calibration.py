@@ -185,10 +185,9 @@ def _nis_sums(
     return detector.judge(np.ascontiguousarray(signals), _codes(len(signals))).value
 
 
-def _falls_to(
-    target: float, of: Callable[[float], float], low: float = 1e-5, high: float = 1e2
-) -> float:
+def _falls_to(target: float, of: Callable[[float], float]) -> float:
     """Where the falling function `of` reaches `target`, by bisection of the logarithm."""
+    low, high = 1e-5, 1e2
     for _ in range(16):
         middle = float(np.sqrt(low * high))
         if of(middle) > target:

@@ -1,10 +1,9 @@
-"""Statistical tests of an innovation sequence: is the model still right?
+"""A statistical test of an innovation sequence: is the model still right?
 
 With the right model the innovations ν are white and νᵀ·S⁻¹·ν is chi-square with m degrees of
 freedom (Mehra and Peschon 1971; Bar-Shalom, Li and Kirubarajan 2001, section 5.4).
 
     sum of N of them > χ²(N·m; 1 - α)      mean or size of the innovations is wrong
-    n·Σ ρ(l)² > χ²(L; 1 - α)               they are not white; ρ(l): autocorrelation
 
 α is the probability of a false alarm in one window. The window slides; windows that do not overlap
 are independent.
@@ -14,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, chdtri
+from scipy.special import chdtri
 
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel
@@ -68,17 +67,3 @@ def push_nis(window: NisWindow, nis: float) -> float:
 def nis_limit(length: int, measurements: int, false_alarm: float) -> float:
     """Limit of the sum over `length` samples of `measurements` each, at `false_alarm`."""
     return float(chdtri(length * measurements, false_alarm))
-
-
-def whiteness(innovations: FloatArray, lags: int) -> tuple[float, float]:
-    """Statistic n·Σ ρ(l)² over lags 1 … `lags` and its p-value under whiteness.
-
-    Args:
-        innovations: one measurement's, shape (n,), n well above `lags`.
-        lags: L [1].
-    """
-    centred = innovations - innovations.mean()
-    power = float(centred @ centred)
-    correlations = np.array([centred[lag:] @ centred[:-lag] for lag in range(1, lags + 1)]) / power
-    statistic = float(innovations.size * np.sum(correlations**2))
-    return statistic, float(chdtrc(lags, statistic))

@@ -1,7 +1,8 @@
-"""Thresholds of the estimates, from healthy data.
+"""The thesis's thresholds of the estimates, for the numerical validation.
 
 The thesis uses mean ± 3·sd of the first 50 estimates. That suits its few hundred estimates; at 256
-a second a healthy estimate exceeds three standard deviations every second or two.
+a second a healthy estimate exceeds three standard deviations every second or two, so the monitor
+has thresholds of its own (`decision_rules`).
 """
 
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ class Thresholds:
         return np.asarray(outside, dtype=np.float64)
 
 
-def thesis_thresholds(theta: FloatArray, factor: float = THESIS_FACTOR) -> Thresholds:
-    """mean ± factor·sd of healthy estimates, shape (n, 2), n at least 2."""
+def thesis_thresholds(theta: FloatArray) -> Thresholds:
+    """mean ± 3·sd of healthy estimates, shape (n, 2), n at least 2."""
     mean, deviation = theta.mean(axis=0), theta.std(axis=0, ddof=1)
-    return Thresholds(mean - factor * deviation, mean + factor * deviation)
+    return Thresholds(mean - THESIS_FACTOR * deviation, mean + THESIS_FACTOR * deviation)

@@ -3,18 +3,20 @@
 import time
 from collections.abc import Callable
 
+EVERY_S = 5.0
+"""Shortest time between two lines [s]."""
+
 
 class Progress:
-    """Says how many units are done, at most once in some seconds.
+    """Says how many units are done, at most once in five seconds.
 
     Args:
         total: number of units.
         say: called with a line for people.
-        every_s: shortest time between two lines [s].
     """
 
-    def __init__(self, total: int, say: Callable[[str], None], every_s: float = 5.0) -> None:
-        self._total, self._say, self._every = total, say, every_s
+    def __init__(self, total: int, say: Callable[[str], None]) -> None:
+        self._total, self._say = total, say
         self._done = self._failed = self._kept = 0
         self._began = self._last = time.monotonic()
 
@@ -29,7 +31,7 @@ class Progress:
         self._done += 1
         self._failed += failed
         now = time.monotonic()
-        if now - self._last >= self._every:
+        if now - self._last >= EVERY_S:
             self._last = now
             self._say(self._line(now - self._began))
 

@@ -38,6 +38,7 @@ def ensure_model(config: Path, folder: Path, say: Callable[[str], None]) -> Path
         say(f"model of the rig: {relative(model)}, made in an earlier run")
         return model
     say("commissioning: the model is made from three recordings, as on a real rig")
+    say("  this takes about a minute, more on a busy machine; later runs use the same model")
     sessions = {role: folder / "commissioning" / f"{role}.mcap" for role in RECORDINGS}
     for role, session in sessions.items():
         session.parent.mkdir(parents=True, exist_ok=True)

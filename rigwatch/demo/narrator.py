@@ -123,10 +123,10 @@ class Narrator:
             return ""
         late = alarm.seq - self._last.seq
         onset = max(0, alarm.onset_seq - self._last.seq)
-        told = "raised" if alarm.name == NAMELESS else "named"
+        told = "alarm raised" if alarm.name == NAMELESS else "named"
         return (
-            f" (noticed {onset / self._rate * 1e3:.0f} ms after it began, "
-            f"{told} after {late / self._rate * 1e3:.0f} ms)"
+            f" (first sign {onset / self._rate * 1e3:.0f} ms after the fault began, "
+            f"{told} at {late / self._rate * 1e3:.0f} ms)"
         )
 
     def _time(self, seq: int) -> str:

@@ -1,9 +1,10 @@
 """The recorder process: writes the recorded topics of the bus to session files.
 
-`expired` holds its rules of retention, which archives use too; `POSITIONS` are the names of files
-that it keeps beside segments and `load_positions` what they hold; `last_block` is the end of a
-session, from its last segments; `sessions_of` finds the sessions of a rig where others may record
-too, and `newest` the last of them.
+    bus ──▶ Feed (complete and in order) ──▶ Store (segments; waits for the disk) ──▶ session folder
+
+`folders` chooses the folder and finds the sessions of a rig; `positions` stores how far a recording
+has come, for a recorder that is restarted; `retention_rules` decides which old recordings are
+removed, here and in archives. `past` closes the gap that a cut link to a remote rig leaves.
 """
 
 from rigwatch.recorder.folders import last_block, newest, sessions_of

@@ -1,4 +1,4 @@
-"""When to report how much of the session's disk is free."""
+"""Reports when the disk of the sessions runs full, and when there is space again."""
 
 import math
 
@@ -21,7 +21,7 @@ class DiskWatch:
 
     @property
     def level(self) -> int:
-        """Number of the limit that the free space is above; the highest if there is enough."""
+        """Index of the limit that the free space has fallen below; the highest if of none."""
         return self._level
 
     @property

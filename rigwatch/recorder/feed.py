@@ -18,7 +18,7 @@ class Feed:
         resume_after: (boot, seq) of the last sample stored by an earlier run of this recorder;
             later ones are fetched from the ring.
         positions: the same for numbered topics.
-        gaps_may_fill: gaps are not published yet, as another recording may fill them.
+        gaps_may_fill: do not publish gaps yet, as another recording may fill them.
 
     Attributes:
         samples: samples delivered.

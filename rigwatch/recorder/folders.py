@@ -5,10 +5,10 @@
 A recorder that was killed and restarted continues in the same folder, or after a long interruption
 in a new one, and queries the rings for what it missed. What they no longer have is a gap. After one
 that was stopped on purpose, a new session begins with the samples from then on, unless the stop was
-short: a recorder that is started anew with a changed configuration misses nothing.
+short: a recorder that is restarted with a changed configuration misses nothing.
 
-`<recorder.folder>/.<rig>.last` names the session that was recorded last: by the times of files, one
-of a day on which the clock was years ahead would be the newest until that year.
+`<recorder.folder>/.<rig>.last` names the session that was recorded last. File times alone do not
+tell: a session recorded while the clock was years ahead would be the newest for years.
 """
 
 import contextlib
@@ -177,9 +177,9 @@ def _ends(root: Path, run: RunInfo) -> Iterator[tuple[str, _Interrupted]]:
 
 
 def _newest_first(root: Path, rig: str, now_ns: int) -> list[Path]:
-    """Sessions with files by the time of the last one; those ahead of the clock come last.
+    """Sessions that have files, by the time of their newest file; those in the future come last.
 
-    The one that was recorded last is where its time says: the clock may have been set back since.
+    The one recorded last keeps its place even so: the clock may have been set back since.
     """
     last = ""
     with contextlib.suppress(OSError, ValueError):

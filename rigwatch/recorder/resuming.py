@@ -1,7 +1,7 @@
-"""Where a recording with a changed configuration goes on: after those senders that are still there.
+"""Where a recording continues after a change of the configuration.
 
-A session of another configuration is another recording: it has no part in what ended with the one
-before, such as an earlier start of the device.
+It continues after the last messages of those senders that are still running. Senders that have gone
+since, such as an earlier boot of the device, belong to the previous session alone.
 """
 
 from dataclasses import replace
@@ -12,7 +12,7 @@ from rigwatch.wire.delivery import SOURCE_KEY
 
 
 def of_living(bus: Bus, place: Place) -> Place:
-    """The place without the samples and messages of senders that are gone."""
+    """The place with the positions of senders that are still running only."""
     boots, runs = _numbers(bus, SOURCE_KEY), _numbers(bus, f"{SAID_KEY}/*")
     positions = {
         topic: {process: at for process, at in said.items() if str(at[0]) in runs}
@@ -23,5 +23,5 @@ def of_living(bus: Bus, place: Place) -> Place:
 
 
 def _numbers(bus: Bus, places: str) -> set[str]:
-    """The boots or runs that tokens name."""
+    """The boots or runs named by the liveliness tokens at these keys."""
     return {name.partition("/")[0] for _, name in bus.names(places) if name}

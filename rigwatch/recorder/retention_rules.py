@@ -1,4 +1,4 @@
-"""Which recordings are removed, by age and total size; those with alarms stay longer."""
+"""Decides which recordings are removed, by age and total size; those with alarms stay longer."""
 
 from collections.abc import Iterable
 from typing import Protocol, TypeVar

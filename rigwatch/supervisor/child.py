@@ -138,8 +138,10 @@ class Child:
         return True
 
     def close(self) -> None:
-        """Kill it and free the socket; a process that cannot be killed is left."""
-        self.close_run()
+        """Kill it and free pipe and socket; a process that cannot be killed is left behind."""
+        if not self.close_run():
+            os.close(self._output)
+            self._process = None
         self.words.close()
         Path(self._address).unlink(missing_ok=True)
 

@@ -1,4 +1,4 @@
-"""The rigs that one supervisor runs: files that are put right join, files that are removed leave.
+"""The rigs that one supervisor runs: a rig joins once its file is valid, and leaves with its file.
 
 file left out ─▶ changed and right ─▶ its rig joins     \\
 file of a rig ─▶ removed           ─▶ its rig leaves     ├▶ the supervisor follows the new plans

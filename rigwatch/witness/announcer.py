@@ -55,7 +55,7 @@ class Announcer:
 
     @property
     def trouble(self) -> str:
-        """What is wrong, in one line; "" for nothing."""
+        """What is wrong, in one line; "" if nothing is."""
         return self._file_trouble or self._delivery.trouble
 
     def _follow_file(self) -> None:

@@ -1,4 +1,4 @@
-"""Calls what may hang, for a limited time: a server may answer a byte at a time for ever."""
+"""Calls that may hang, with a time limit: a server may send its answer byte by byte for ever."""
 
 import threading
 from collections.abc import Callable
@@ -37,4 +37,4 @@ class Bounded:
         thread.join(longest)
         if thread.is_alive():
             self._hung.append(thread)
-            raise TimeoutError(f"no end of the answer within {longest:g} s")
+            raise TimeoutError(f"not finished within {longest:g} s")

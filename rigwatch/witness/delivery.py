@@ -29,7 +29,7 @@ RETRIES_S = (2.0, 10.0, 60.0)
 COMMAND_S = 60.0
 """Longest run of a command [s]."""
 ADDRESS_S = 30.0
-"""Longest attempt to reach an address: a server may answer a byte at a time for ever [s]."""
+"""Longest attempt to reach an address; its server may send its answer byte by byte for ever [s]."""
 Send = Callable[[Notice], bool]
 
 

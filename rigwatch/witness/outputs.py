@@ -37,7 +37,7 @@ class Outputs:
 
     @property
     def trouble(self) -> str:
-        """Why an output is not renewed, in one line; "" for nothing."""
+        """Why an output is not renewed, in one line; "" if all are."""
         return self._file_trouble or (self._pinger.trouble if self._pinger else "")
 
     @property
@@ -54,7 +54,7 @@ class Outputs:
             now: monotonic time [s].
             t_ns: Unix time [ns].
             silent: time since the last estimate [s].
-            stale: whether that is an alarm.
+            stale: whether that is long enough for the alarm `monitor_stale`.
         """
         self.figures.advance(now, silent)
         for health in self._healths.drain() if self._healths else ():

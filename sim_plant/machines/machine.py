@@ -115,10 +115,10 @@ def _oscillator(force: FloatArray, hidden: Mapping[str, float]) -> FloatArray:
     return np.column_stack([force, oscillate(force, faults, np.zeros(2), 0)])
 
 
-def _force(seed: int, samples: int = 3072) -> FloatArray:
-    """Multisine force from 0.25 to 8 Hz with random phases, rms 4 N, shape (samples,)."""
+def _force(seed: int) -> FloatArray:
+    """Multisine force from 0.25 to 8 Hz with random phases, rms 4 N, shape (3072,)."""
     phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, 31)
-    time, lines = np.arange(samples) / OSCILLATOR_RATE, np.arange(0.25, 8, 0.25)
+    time, lines = np.arange(3072) / OSCILLATOR_RATE, np.arange(0.25, 8, 0.25)
     return np.asarray(
         4 * np.cos(2 * np.pi * np.outer(time, lines) + phases).sum(1) / np.sqrt(31 / 2)
     )

@@ -11,6 +11,8 @@ from sim_plant.serve.source import Device
 
 ALIASES = {"friction": "coulomb"}
 """Short names of common effects."""
+DONE_S = 2.0
+"""Longest wait for the rig's next sample [s]."""
 
 
 class Effects(Protocol):
@@ -48,11 +50,11 @@ class Controlled:
             done.set()
         return self._source.advance(n)
 
-    def do(self, act: Callable[[], None], timeout: float = 2.0) -> None:
+    def do(self, act: Callable[[], None]) -> None:
         """Run `act` before the next sample; its error is raised here."""
         done, errors = threading.Event(), list[Exception]()
         self._waiting.append((act, done, errors))
-        if not done.wait(timeout):
+        if not done.wait(DONE_S):
             raise DeviceError("the simulated rig does not advance")
         if errors:
             raise errors[0]

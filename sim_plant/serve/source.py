@@ -53,16 +53,13 @@ class Device:
 
     Args:
         source: gives codes and true times.
-        boot: None draws one.
         first_seq: number of the first sample, near 2³² to see it wrap.
         first_us: device clock at the first sample [µs].
     """
 
-    def __init__(
-        self, source: Source, boot: int | None = None, first_seq: int = 0, first_us: int = 0
-    ) -> None:
+    def __init__(self, source: Source, first_seq: int = 0, first_us: int = 0) -> None:
         self._source = source
-        self.boot = secrets.randbits(32) if boot is None else boot
+        self.boot = secrets.randbits(32)
         self._seq = first_seq
         self._us = first_us
         self._previous_us: int | None = None

@@ -136,12 +136,13 @@ SUPERVISED = """
 import sys
 from tests.tooling.test_supervisor import *
 away = ProcessPlan("away", (sys.executable, "-c", sys.argv[1]))
-limits = Limits(start=1.0, stop=0.5, first_pause=0.1, longest_pause=0.5)
+limits = Limits(start=1.0, stop=5.0, first_pause=0.1, longest_pause=0.5)
 events = []
-supervisor = Supervisor([away, worker("daq")], events.append, limits)
+# The last one is stopped first.
+supervisor = Supervisor([worker("daq"), away], events.append, limits)
 def turn():
     told = [event for event in events if "cannot be killed" in event.text]
-    if len(told) == 2 and supervisor.processes["daq"].vitals.count > 0:
+    if len(told) >= 2 and supervisor.processes["daq"].vitals.count > 0:
         supervisor.stop()
 supervisor.run(turn)
 print(*[event.pid for event in of_kind(events, "away", "started")])

@@ -130,10 +130,10 @@ def test_an_alarm_is_reported_with_its_cause_and_its_delay_after_what_was_done()
     narrator.alarm(alarm(seq=begins + 32))
     assert "dry friction of 0.43 N begins" in said[0]
     assert CAUSE in said[1]
-    assert "noticed 47 ms after it began, named after 125 ms" in said[1]
+    assert "first sign 47 ms after the fault began, named at 125 ms" in said[1]
     assert "Stop and look." in said[2]
     narrator.alarm(alarm("departure", begins + 32))
-    assert "raised after 125 ms" in said[3]
+    assert "alarm raised at 125 ms" in said[3]
 
 
 def test_the_wait_for_the_next_fault_is_told_at_the_start_and_after_each_one() -> None:

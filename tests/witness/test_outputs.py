@@ -136,7 +136,7 @@ def test_a_server_that_does_not_speak_http_or_never_ends_is_told_and_does_not_en
             pinger.beat(float(count))
             eventually(lambda wanted=count: pinger.failed == wanted, "the failure")
         drip.shutdown()
-    told = "no end of the answer within 0.2 s" if answer == b"H" else "the answer is not HTTP"
+    told = "not finished within 0.2 s" if answer == b"H" else "the answer is not HTTP"
     assert pinger.trouble == f"heartbeat_url cannot be reached: {told}"
 
 

@@ -34,12 +34,13 @@ from rigwatch.wire.errors import ModelError
 
 EQUATIONS = "servo-pneumatic"
 """Shipped model that is fitted by default."""
+CORNER = 2.0
+"""Corner of the high-pass of all judged signals [Hz]."""
 
 
 def commission_equations(
     recordings: Sequence[Recording],
     name: str = EQUATIONS,
-    corner: float = 2.0,
     say: Callable[[str], None] = lambda _: None,
 ) -> RigModel:
     """The model file of the observer scheme.
@@ -47,7 +48,6 @@ def commission_equations(
     Args:
         recordings: chirps and healthy ones; others are not used.
         name: of a shipped model, or its file.
-        corner: of the high-pass of all judged signals [Hz].
         say: called with one line at each step.
 
     Raises:
@@ -64,11 +64,10 @@ def commission_equations(
     check_moves(used, [state.channel for state in measured_states(base_model(name))])
     readings, seem = [False] * len(used), _seem_to_jitter(used, name, rate)
     if seem == readings:
-        return _commissioned(used, name, corner, rate, readings, say=say)
+        return _commissioned(used, name, rate, readings, say=say)
     say("the drive's steps may jitter: fitting without and with it")
     return _quieter(
-        partial(_commissioned, used, name, corner, rate, jitters, say=say)
-        for jitters in (readings, seem)
+        partial(_commissioned, used, name, rate, jitters, say=say) for jitters in (readings, seem)
     )
 
 
@@ -106,7 +105,6 @@ def _quieter(attempts: Iterable[Callable[[], RigModel]]) -> RigModel:
 def _commissioned(
     used: Sequence[Recording],
     name: str,
-    corner: float,
     rate: float,
     jitters: Sequence[bool],
     *,
@@ -117,7 +115,6 @@ def _commissioned(
     Args:
         used: recordings.
         name: of the equations.
-        corner: of the high-pass [Hz].
         rate: sample rate [Hz].
         jitters: of which recordings the inputs' steps jitter.
         say: called with one line at each step.
@@ -126,7 +123,7 @@ def _commissioned(
         ModelError: the equations do not describe the rig, or a recording is not healthy.
     """
     say("1 of 3: parameters of the equations")
-    plant = fitted_equations(used, name, corner, rate, jitters)
+    plant = fitted_equations(used, name, CORNER, rate, jitters)
     say("2 of 3: what the healthy rig leaves of them")
     parts, roles, remainder, scheme = healthy_remainder(used, plant, rate, jitters)
     say("3 of 3: limits of the healthy rig")

@@ -34,7 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             f"--{role}", type=Path, action="append", default=[], metavar="SESSION", help=text
         )
-    parser.add_argument("--output", type=Path, default=Path("model.toml"), help="the model file")
+    parser.add_argument(
+        "--output", type=Path, default=Path("model.toml"), help="the model file, default model.toml"
+    )
     parser.add_argument(
         "--plant",
         choices=("transfer-function", "inertia"),
@@ -61,10 +63,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--band", type=POSITIVE, nargs=2, default=(1.0, 14.0), metavar=("LOW", "HIGH"),
-        help="frequency range of the transfer function's fit [Hz]",
+        help="frequency range of the transfer function's fit [Hz], default 1 14",
     )  # fmt: skip
-    parser.add_argument("--window", type=whole(1), help="window of the estimates [samples]")
-    parser.add_argument("--hop", type=whole(1), default=1, help="samples between estimates")
+    parser.add_argument(
+        "--window",
+        type=whole(1),
+        help="window of the estimates [samples], default 32, for inertia 6 s",
+    )
+    parser.add_argument(
+        "--hop", type=whole(1), default=1, help="samples between estimates, default 1"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:

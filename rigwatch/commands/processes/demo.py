@@ -24,7 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seconds", type=POSITIVE, metavar="N", help="maximum run time [s]")
     parser.add_argument(
-        "--folder", type=Path, help="output folder, else demo-session or, beside another, -2 and on"
+        "--folder",
+        type=Path,
+        help="output folder; default: demo-session, or demo-session-2 and so on while it is in use",
     )
     parser.add_argument(
         "--commission-only", action="store_true", help="make the model of the simulated rig and end"

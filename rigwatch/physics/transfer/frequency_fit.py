@@ -22,6 +22,7 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 Complex = NDArray[np.complex128]
+START_ROUNDS = 30
 DESCENT = Descent(steps=200, more=4.0, less=5.0, worth=1e-12)
 
 
@@ -65,11 +66,11 @@ class _Problem:
         b = np.concatenate([np.zeros(self.delay), theta[: self.zeros + 1]])
         return TransferFunction.of(b, np.concatenate([[1.0], theta[self.zeros + 1 :]]))
 
-    def linear_start(self, rounds: int = 30) -> FloatArray:
+    def linear_start(self) -> FloatArray:
         """Levy, then Sanathanan and Koerner."""
         weight = self.w
         best, best_cost = np.zeros(0), np.inf
-        for _ in range(rounds):
+        for _ in range(START_ROUNDS):
             theta = self._levy(weight)
             stable = self._stable(theta)
             if (cost := self._cost(stable)) < best_cost:

@@ -22,6 +22,7 @@ from rigwatch.physics.transfer.transfer_function import TransferFunction, reflec
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
+START_ROUNDS = 12
 DESCENT = Descent(steps=60, more=10.0, less=10.0, worth=1e-10)
 
 
@@ -104,9 +105,9 @@ class _Search:
     def _slow_poles(self) -> FloatArray:
         return np.asarray(np.poly(np.full(self.orders.nf, 0.9))[1:])
 
-    def _rounds(self, f: FloatArray, rounds: int = 12) -> list[FloatArray]:
+    def _rounds(self, f: FloatArray) -> list[FloatArray]:
         found = []
-        for _ in range(rounds):
+        for _ in range(START_ROUNDS):
             theta = self._linear(f)
             f = theta[self.orders.nb :]
             found.append(theta)

@@ -1,4 +1,4 @@
-"""What a site's recordings have of the time in which its link to others was cut.
+"""Fills the gap that a cut link leaves: from the recordings of the site where the rig stands.
 
     site          PastServer ◀──Question── PastQuestions        headquarters
     recordings ──▶    └──────Page──────▶        └──▶ BlockStream, Outage ──▶ recording

@@ -1,7 +1,7 @@
-"""Alarms, events, health and the like of a time in which a site was cut off, each once.
+"""Alarms, events, health messages and the like that were missed while a site was cut off.
 
-The messages of the last minutes are known by their hashes; what a recording has of the same time
-and is not among them was missed.
+The messages received in the last minutes are known by their hashes. A message that a recording has
+of the same time, and whose hash is not among them, was missed; each is added once.
 """
 
 import hashlib
@@ -13,17 +13,17 @@ from rigwatch.wire.messages import RECORDERS, Gap, Health, Message, decode, enco
 from rigwatch.wire.session import Part, message_time
 
 SITE = RECORDERS[0]
-"""The process of the site whose health, each second, shows until when the link was up."""
+"""The site's process whose health message, sent each second, shows until when the link was up."""
 MARGIN_NS = 3_000_000_000
-"""Asked for before and after an outage: messages of one time come on several ways [ns]."""
+"""Time asked for before and after an outage: topics may be delayed differently [ns]."""
 KNOWN_NS = 300_000_000_000
 """Time for which messages are known [ns]."""
 LATE_NS = 120_000_000_000
-"""Time after an outage within which a gap is due to it [ns]."""
+"""Time after an outage within which a gap is attributed to it [ns]."""
 
 
 class Outage:
-    """What was missed of the topics that are no blocks.
+    """What was missed of all topics other than samples and estimates.
 
     Args:
         began: time at which an earlier run ended, an outage like any other [ns].
@@ -51,7 +51,7 @@ class Outage:
         self._back = up
 
     def hear(self, message: Message) -> bool:
-        """Take notice of a message that has come by itself; returns whether it is new."""
+        """Take a message that the bus has delivered; returns whether it is new."""
         t_ns = message_time(message)
         if isinstance(message, Health) and message.source == SITE:
             # Messages of other topics may come late, out of a ring.
@@ -70,7 +70,7 @@ class Outage:
         self._remember(message, message_time(message))
 
     def gap(self, gap: Gap) -> list[Gap]:
-        """A numbered topic misses messages; returns the gap if no outage explains it."""
+        """Take a gap of a numbered topic; returns it unless an outage explains it."""
         if self.span is None and self._began is None:
             if self._last is None or self._heard > self._last.end + LATE_NS:
                 return [gap]
@@ -92,7 +92,7 @@ class Outage:
         return [] if answered else gaps
 
     def rest(self) -> list[Gap]:
-        """The gaps of an outage whose answer has not come."""
+        """The gaps of an outage that has not been answered."""
         return self.end(answered=False)
 
     def _remember(self, message: Message, t_ns: int) -> bool:

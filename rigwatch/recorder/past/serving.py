@@ -1,4 +1,4 @@
-"""Answers for the sessions of a rig: where the rings end, the recordings go on."""
+"""Answers questions from the session files of a rig, for what its rings no longer hold."""
 
 import contextlib
 import os

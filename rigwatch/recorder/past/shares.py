@@ -1,15 +1,15 @@
-"""Whose turn it is: recorders that ask for pages share the rate of the answers evenly.
+"""Shares the rate of the answers evenly among the recorders that ask for pages.
 
-Each asker has a clock of the time that its pages took. One that is ahead of another that waits is
-refused until that one has been served as much; refused ones ask again, so none is woken. An asker
-that stops asking no longer waits after a moment, and one that begins starts level with the rest.
-Pure: it receives the time.
+The time that its pages took is added up for each asker. An asker that has been served more than one
+that waits is refused until they are even; it asks again by itself, so nobody has to be woken. One
+that stops asking soon no longer counts as waiting, and a new one starts even with the least served.
+Receives the time and reads no clock.
 """
 
 from dataclasses import dataclass
 
 WAITS = 1.0
-"""Time for which one that was refused counts as waiting: several of its attempts [s]."""
+"""Time for which an asker counts as waiting after a refusal: several of its attempts [s]."""
 MOST_ASKERS = 16
 """Askers told apart; further ones count as one, since a name costs a stranger nothing."""
 
@@ -41,7 +41,7 @@ class Shares:
         return not one.waits
 
     def refused(self, name: str, now: float) -> None:
-        """An asker that was admitted could not be served: the server is ahead of its rate."""
+        """An admitted asker could not be served after all, as the server is ahead of its rate."""
         self._known(name, now).waits = True
 
     def served(self, name: str, cost: float, now: float) -> None:

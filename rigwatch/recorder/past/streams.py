@@ -1,11 +1,11 @@
-"""Samples or estimates in order, with what a ring no longer had put in from a recording.
+"""Samples or estimates in order, with those that the ring no longer had filled in from a recording.
 
     blocks, gaps ──▶ BlockStream ──▶ blocks in order; gaps that no recording fills
                         │ Hole ▲
                         ▼      └── blocks of the recording
 
-From the first gap on everything waits until the recording's answer has come. It is known which
-samples are there already, so that none comes twice, whatever the answer repeats.
+From the first gap on all blocks wait until the recording has answered. The samples received so far
+are known, so that none is delivered twice, whatever the answer repeats.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,14 +18,14 @@ from rigwatch.wire.session import Span, without
 
 @dataclass(frozen=True, slots=True)
 class Hole:
-    """What is missing lies between these times, both included [ns]."""
+    """The span in which messages are missing, both ends included [ns]."""
 
     start: int
     end: int
 
 
 class BlockStream:
-    """The blocks of one topic and what fills their gaps.
+    """The blocks of one topic, whose gaps are filled from a recording.
 
     Args:
         last: the last block that an earlier run has recorded; None if there is none.

@@ -19,12 +19,12 @@ PATIENCE = 8.0
 """Longest orderly end of a process whose supervisor is gone; as long as a supervisor waits [s]."""
 
 
-def set_at_signal(stop: threading.Event | None = None) -> threading.Event:
-    """Let SIGINT and SIGTERM set `stop`, or a new event, and return it; for the main thread.
+def set_at_signal() -> threading.Event:
+    """A new event that SIGINT and SIGTERM set; for the main thread.
 
     If its supervisor no longer lives, nobody would kill a process that hangs: it kills itself then.
     """
-    event, parent = stop or threading.Event(), os.getppid()
+    event, parent = threading.Event(), os.getppid()
 
     def end() -> None:
         event.set()

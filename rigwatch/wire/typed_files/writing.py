@@ -6,9 +6,9 @@ from typing import Any
 import msgspec
 
 
-def as_toml(tree: Mapping[str, Any], prefix: str = "") -> str:
+def as_toml(tree: Mapping[str, Any]) -> str:
     """A tree of plain values as TOML text; None is omitted."""
-    return "\n".join(_lines(tree, prefix)) + "\n"
+    return "\n".join(_lines(tree, "")) + "\n"
 
 
 def _lines(tree: Mapping[str, Any], prefix: str) -> Iterator[str]:

@@ -15,6 +15,8 @@ VERDICTS = {
     "unknown_effect": "something is missing that no known effect explains",
     "model_inadequate": "the model is inadequate for this recording: no effect is named",
 }
+MOST_ROWS = 12
+"""Rows of a printed ranking; `--json` has all."""
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
@@ -108,7 +110,7 @@ def _interval(value: Value) -> str:
     return f"{value.interval[0]:.4g} … {value.interval[1]:.4g}"
 
 
-def explanation_lines(found: Explanation, most: int = 12) -> list[str]:
+def explanation_lines(found: Explanation) -> list[str]:
     """What `rigwatch explain` prints."""
     base = found.comparison
     lines = [
@@ -126,7 +128,9 @@ def explanation_lines(found: Explanation, most: int = 12) -> list[str]:
         f"ranking ({len(found.ranking)} effects at ports)",
     ]
     errors = [f"training [{base.told_in}]", "held out", "p", "", "cannot be told from"]
-    lines += table(["effect@port", *errors], [_ranked(row, base) for row in found.ranking[:most]])
+    lines += table(
+        ["effect@port", *errors], [_ranked(row, base) for row in found.ranking[:MOST_ROWS]]
+    )
     if found.next_experiment:
         lines += ["", f"next experiment: {found.next_experiment.text}"]
     return lines + [f"note: {remark}" for remark in base.remarks]
@@ -211,7 +215,7 @@ def _errors(found: Comparison) -> list[str]:
     return [number(found.told(error)) for error in (found.train_error, found.held_out_error)]
 
 
-def base_lines(found: Bases, most: int = 12) -> list[str]:
+def base_lines(found: Bases) -> list[str]:
     """What `rigwatch study base` prints."""
     head = ["variants", "training", "held out", "over noise", "parameters"]
     rows = [
@@ -220,7 +224,7 @@ def base_lines(found: Bases, most: int = 12) -> list[str]:
             *map(number, (base.train_error, base.held_out_error, base.over_noise)),
             str(base.parameters),
         ]
-        for base in found.ranking[:most]
+        for base in found.ranking[:MOST_ROWS]
     ]
     enough = found.enough
     lines = [f"healthy recordings, error in noise standard deviations ({len(found.ranking)} bases)"]

@@ -99,17 +99,15 @@ def hand_over(
     return ModelHandover(reply, live, found)
 
 
-def restore(
-    rig: Path, user: str = "", say: Callable[[str], None] = lambda _: None
-) -> ModelHandover:
+def restore(rig: Path) -> ModelHandover:
     """Restore the previous model of a rig's monitor, whatever the present one is from.
 
     Raises:
         ConfigError: the rig's configuration cannot be read, or there is no previous model.
     """
-    user = operator_name(load_rig(rig).bus, user)
+    user = operator_name(load_rig(rig).bus, "")
     wish = ModelRequest("rollback", "", user, "rolled back from the rig's page")
-    granted, live = _send(rig, model_path(rig), wish, say)
+    granted, live = _send(rig, model_path(rig), wish, lambda _: None)
     return ModelHandover(granted, live, None)
 
 

@@ -33,10 +33,10 @@ class Scope:
         if isinstance(unit, str) and names_gram(unit):
             self.grams.add(name)
 
-    def define_all(self, units: Mapping[str, str], prefix: str = "") -> None:
-        """Define each name as a separate symbol, named with `prefix`."""
+    def define_all(self, units: Mapping[str, str]) -> None:
+        """Define each name as a symbol of its own."""
         for name, unit in units.items():
-            self.define(name, symbol(prefix + name), unit)
+            self.define(name, symbol(name), unit)
 
     def copy(self) -> "Scope":
         """An independent copy of this scope."""

@@ -88,17 +88,14 @@ def motion_widths(model: Model, recording: Recording, parts: Sequence[int] = ())
     return found
 
 
-def motion_phases(
-    model: Model, recording: Recording, parts: Sequence[int] = ()
-) -> dict[str, SensorPhase]:
+def motion_phases(model: Model, recording: Recording) -> dict[str, SensorPhase]:
     """Phase between each channel of the motion and the output that measures its rate.
 
     Args:
         model: the original model, not transformed.
         recording: of the healthy rig, whose sensors are as they should be.
-        parts: lengths of the concatenated parts; the recording's own if empty.
     """
-    cut, channels = _ends(recording, parts), _channels(model, recording)
+    cut, channels = _ends(recording, ()), _channels(model, recording)
     outputs = predicted_outputs(model)
     if not outputs or recording.thinning is not None:
         return {}

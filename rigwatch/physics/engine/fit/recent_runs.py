@@ -18,8 +18,8 @@ MOST = 32_000_000
 class RecentRuns:
     """Runs by key, the most recent ones only."""
 
-    def __init__(self, most: int = MOST) -> None:
-        self._most, self._size, self._lock = most, 0, Lock()
+    def __init__(self) -> None:
+        self._size, self._lock = 0, Lock()
         self._kept: OrderedDict[tuple[object, ...], FloatArray] = OrderedDict()
 
     def get(self, key: tuple[object, ...], make: Callable[[], FloatArray]) -> FloatArray:
@@ -35,7 +35,7 @@ class RecentRuns:
             if key not in self._kept:
                 self._kept[key] = made
                 self._size += made.nbytes
-            while self._size > self._most:
+            while self._size > MOST:
                 self._size -= self._kept.popitem(last=False)[1].nbytes
         return made
 

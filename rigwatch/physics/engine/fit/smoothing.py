@@ -74,11 +74,11 @@ def best_width(signal: FloatArray, order: int) -> int:
     return allowed[int(np.argmin(errors))]
 
 
-def flat_to(width: int, order: int, tolerance: float = 0.05) -> float:
-    """Frequency up to which the kernel differentiates accurately, relative to the sample rate."""
+def flat_to(width: int, order: int) -> float:
+    """Frequency up to which the kernel differentiates within 5 %, relative to the sample rate."""
     frequency = np.linspace(1e-3, np.pi, 2000)
     response = _response(width, order, frequency) / frequency**order
-    off = np.flatnonzero(np.abs(response - 1) > tolerance)
+    off = np.flatnonzero(np.abs(response - 1) > 0.05)
     return float(frequency[off[0]] if off.size else np.pi) / (2 * np.pi)
 
 
