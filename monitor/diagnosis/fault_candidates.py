@@ -7,6 +7,7 @@ an effect counts with the size that it has. Those that explain nearly as much as
 well the model's response is known, form a class, and the simplest of them names it.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -198,10 +199,10 @@ def _named(rows: Sequence[Suspect], noise: float, error: float) -> list[Suspect]
 
     def left(row: Suspect) -> float:
         """Amplitude of what it leaves beside the noise, relative to the change."""
-        return float(np.sqrt(max(1.0 - row.explained - noise, 0.0)))
+        return math.sqrt(max(1.0 - row.explained - noise, 0.0))
 
     best = rows[0]
-    unsure = max(error / np.sqrt(2.0), UNSURE * left(best))
+    unsure = max(error / math.sqrt(2.0), UNSURE * left(best))
 
     def equal(row: Suspect) -> bool:
         # A filter is described as one of samples or of time; neither is what the rig has.
