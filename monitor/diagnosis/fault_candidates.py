@@ -179,7 +179,8 @@ def _sized(
         free, family = candidate.effect.free, candidate.effect.family
         row = Suspect(candidate.name, candidate.port, one.p_value, explained, free, family)
         (fitted if worth else others).append(row)
-    return sorted(fitted, key=lambda row: -row.explained) + others
+    # What explains the same but for rounding stays in the order of ports: the load comes first.
+    return sorted(fitted, key=lambda row: -round(row.explained, 4)) + others
 
 
 def _named(rows: Sequence[Suspect], noise: float, error: float) -> list[Suspect]:
@@ -210,7 +211,7 @@ def _named(rows: Sequence[Suspect], noise: float, error: float) -> list[Suspect]
         return left(row) <= left(best) + (max(error, unsure) if kin else unsure)
 
     equals = [row for row in rows if equal(row)]
-    first = min(equals, key=lambda row: row.parameters)
+    first = min(equals, key=lambda row: max(row.parameters, 1))  # a switch is one, too
     first = replace(first, alike=tuple(row.label for row in equals if row is not first))
     return [first, *(row for row in rows if row.label != first.label)]
 
