@@ -5,6 +5,7 @@ position and an accelerometer are measured, how far the two differ (`sensor_agre
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -34,7 +35,7 @@ class Evidence:
     change: FloatArray
     onset: int
 
-    @property
+    @cached_property
     def bridged(self) -> FloatArray:
         """The signals with their holes filled, shape (n, channels)."""
         return np.stack([filled(signal) for signal in self.signals.T], axis=1)

@@ -9,7 +9,7 @@ from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.study.study import open_study
 from tests.workbench.machine import Table, recorded, studied
-from tests.workbench.verdicts.test_refinements import MODEL, RATE, STEPS, UNITS
+from tests.workbench.verdicts.test_refinements import MODEL, RATE, UNITS, run
 
 MIDDLE, CUBIC = 0.004, 4e4
 
@@ -30,21 +30,13 @@ def sprung(u: np.ndarray, cubic: float, steps: int, h: float) -> np.ndarray:
     return out
 
 
-def run(seed: int, cubic: float, samples: int = 4096) -> Table:
-    generator = np.random.default_rng(seed)
-    lines = np.arange(3, 120)
-    spectrum = np.zeros(513, dtype=complex)
-    spectrum[lines] = np.exp(2j * np.pi * np.random.default_rng(7).random(lines.size))
-    drive = np.fft.irfft(spectrum, 1024)
-    u = np.tile(2.0 * drive / drive.std(), samples // 1024)
-    moved = sprung(u, cubic, STEPS, 1.0 / (RATE * STEPS))
-    moved += generator.normal(size=moved.shape) * [2e-6, 0.01]
-    return {"u": u, "x": moved[:, 0], "a": moved[:, 1]}
+def logged(seed: int, cubic: float = CUBIC) -> Table:
+    return run(seed, cubic, machine=sprung)
 
 
 def test_the_middle_of_a_stiffening_spring_is_found(tmp_path: Path) -> None:
-    made = studied(tmp_path, MODEL, [run(0, CUBIC)], [run(1, CUBIC)], UNITS, rates=[RATE, RATE])
-    recorded(tmp_path / "healthy.mcap", run(2, 0.0), UNITS, RATE)
+    made = studied(tmp_path, MODEL, [logged(0)], [logged(1)], UNITS, rates=[RATE, RATE])
+    recorded(tmp_path / "healthy.mcap", logged(2, cubic=0.0), UNITS, RATE)
     with (made.folder / "study.toml").open("a") as file:
         file.write('[[healthy]]\nsession = "../healthy.mcap"\n')
     bench = open_bench(open_study(made.folder))

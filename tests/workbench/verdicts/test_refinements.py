@@ -1,5 +1,6 @@
 """A guide that binds and bends before it slips is found by a refinement of `binding`."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -52,14 +53,18 @@ def slid(u: np.ndarray, binding: float, steps: int, h: float) -> np.ndarray:
     return out
 
 
-def run(seed: int, binding: float, samples: int = 4096) -> Table:
+Machine = Callable[[np.ndarray, float, int, float], np.ndarray]
+
+
+def run(seed: int, strength: float, samples: int = 4096, machine: Machine = slid) -> Table:
+    """A log of the machine under a multisine, with an effect of that strength and noise."""
     generator = np.random.default_rng(seed)
     lines = np.arange(3, 120)
     spectrum = np.zeros(513, dtype=complex)
     spectrum[lines] = np.exp(2j * np.pi * np.random.default_rng(7).random(lines.size))
     drive = np.fft.irfft(spectrum, 1024)
     u = np.tile(2.0 * drive / drive.std(), samples // 1024)
-    moved = slid(u, binding, STEPS, 1.0 / (RATE * STEPS))
+    moved = machine(u, strength, STEPS, 1.0 / (RATE * STEPS))
     moved += generator.normal(size=moved.shape) * [2e-6, 0.01]
     return {"u": u, "x": moved[:, 0], "a": moved[:, 1]}
 
