@@ -13,6 +13,7 @@ from rigwatch.workbench.data import (
     Data,
     NoiseFloor,
     along_motion,
+    expected_error,
     from_residual,
     predicts_along_motion,
     prepare,
@@ -107,10 +108,12 @@ def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench
         floor = from_residual(base.held_out, data.held_out, study.file.period, data.horizon)
         return Bench(study, data, base, floor, None)
     bare = fit_model(study, healthy, (), study.file.start, base.train.scale, multi_start=True)
-    return Bench(study, data, base, _of_healthy(study, healthy, base, bare), bare)
+    return Bench(study, data, base, _of_healthy(study, data, healthy, base, bare), bare)
 
 
-def _of_healthy(study: Study, healthy: Data, base: Fitted, bare: Fitted) -> NoiseFloor:
+def _of_healthy(
+    study: Study, data: Data, healthy: Data, base: Fitted, bare: Fitted
+) -> NoiseFloor:
     """The noise floor from a healthy recording.
 
     An accepted effect may be part of the healthy rig, or unable to vanish (a delay has a lower
@@ -119,5 +122,8 @@ def _of_healthy(study: Study, healthy: Data, base: Fitted, bare: Fitted) -> Nois
     fits = [bare]
     if base.placements:
         fits.append(fit_base(study, healthy, base.train.scale, multi_start=True))
-    method = "healthy motion" if healthy.along_motion else "healthy"
-    return NoiseFloor(min(fits, key=lambda fitted: fitted.train_error).held_out.rms, method)
+    held_out = min(fits, key=lambda fitted: fitted.train_error).held_out
+    if not healthy.along_motion:
+        return NoiseFloor(held_out.rms, "healthy")
+    own = expected_error(held_out.residuals, healthy.held_out.outputs, data.held_out.outputs)
+    return NoiseFloor(held_out.rms, "healthy motion", own_error=own)

@@ -1,6 +1,7 @@
 """A study's measured data: signals on one time grid, their scales, and the noise floor."""
 
 from rigwatch.workbench.data.columns import Columns, bridged, copies
+from rigwatch.workbench.data.error_spectrum import expected_error
 from rigwatch.workbench.data.healthy_elements import with_elements
 from rigwatch.workbench.data.motion import along_motion, predicts_along_motion
 from rigwatch.workbench.data.next_rows import with_next_rows
@@ -36,6 +37,7 @@ __all__ = [
     "along_motion",
     "bridged",
     "copies",
+    "expected_error",
     "find_period",
     "from_residual",
     "lowered",

@@ -13,6 +13,7 @@ import numpy as np
 from rigwatch.physics.engine.fit import Fit, Recording
 from rigwatch.physics.transfer import period_by_correlation, shortest_period
 from rigwatch.wire.arrays import BoolArray, FloatArray
+from rigwatch.workbench.data.error_spectrum import ErrorSpectrum
 from rigwatch.workbench.data.quietest_band import quietest_band
 
 METHODS = {
@@ -23,6 +24,8 @@ METHODS = {
 }
 ALLOWED = {"periods": 1.1, "healthy": 1.1, "healthy motion": 1.05, "quiet band": 1.25}
 """Largest ratio of error to noise floor at which nothing remains to be explained, by method."""
+BY_CHANCE = 0.1
+"""Energy above the model's own error, in units of the noise floor, that chance leaves."""
 FEWEST_PERIODS = 3
 REPEATED = 2e-4
 """Mean square difference of an input one period later, relative to its own; rms 1 % of each."""
@@ -36,11 +39,14 @@ class NoiseFloor:
         rms: in the channels' units, shape (outputs,).
         method: key of `METHODS`.
         chance: largest ratio of error to floor that a short recording reaches with noise alone.
+        own_error: the error that the model's healthy error lets expect along this motion, by
+            frequency; None if that is not known.
     """
 
     rms: FloatArray
     method: str
     chance: float = 1.0
+    own_error: ErrorSpectrum | None = None
 
     @property
     def allowed(self) -> float:
@@ -78,6 +84,20 @@ class NoiseFloor:
         least = self.allowed**2 if tolerant else 1.0
         above = self.ratio(before, at) ** 2 - 1
         return max(self.ratio(after, at) ** 2 - least, 0.0) / max(above, 1e-12)
+
+    def beyond_own_error(self, before: Fit, after: Fit, at: BoolArray | None = None) -> float:
+        """Share of the energy beyond the model's own error that remains from one fit to another.
+
+        Args:
+            before, after, at: as in `left_over`.
+
+        Returns:
+            Infinite if the model's own error is not known.
+        """
+        if self.own_error is None:
+            return math.inf
+        left, above = (self.own_error.beyond(f.residuals, self.rms, at) for f in (after, before))
+        return max(left - BY_CHANCE, 0.0) / max(above, 1e-12)
 
 
 def from_residual(fitted: Fit, recording: Recording, period: float, horizon: int) -> NoiseFloor:

@@ -173,7 +173,7 @@ def with_motion_sensor(bench: Bench, found: Verdict) -> Verdict:
         return _named(bench, best, rows)
     if found.best is None or found.best.gain is None or best.gain is None:
         return found
-    if best.gain < NEARLY * found.best.gain and not found.second:
+    if best.gain < NEARLY * found.best.gain:
         return found
     text = f"{found.best.label} may be missing, but {best.label} explains nearly as much or more"
     return replace(found, word="undetermined", rivals=(*found.rivals, best.label), text=text)

@@ -6,7 +6,9 @@ residual's amplitude that two directions explain alone, and c their cosine,
 
     explained = (a² + b² - 2·a·b·c) / (1 - c²),   strengths ∝ (a - b·c), (b - a·c)
 
-The most promising pairs are fitted; the held-out error decides.
+The most promising pairs are fitted; the held-out error decides. If none of them explains the error,
+effects of the best pair give way to refinements of them, as a spring beside a seal is the right
+kind of physics but its middle elsewhere.
 """
 
 import dataclasses
@@ -23,7 +25,15 @@ from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.explain.rough_verdict import much_left
 from rigwatch.workbench.explain.verdict import Verdict, Word, judge
 from rigwatch.workbench.fit import Fitted, fit_model
-from rigwatch.workbench.ranking import SIMILAR, Progress, Ranked, judge_fit, refit
+from rigwatch.workbench.ranking import (
+    SIMILAR,
+    Progress,
+    Ranked,
+    judge_fit,
+    promises_more,
+    refinements,
+    refit,
+)
 
 LIKELY = 0.7
 """Share of the energy above the floor a pair must explain, to first order, to be fitted."""
@@ -75,6 +85,9 @@ def two_effects(
     """
     fits = _fitted(bench, likely_pairs(bench, rows), progress)
     good = _explaining(bench, fits, tolerant=tolerant)
+    if fits and not good:
+        rows, fits = _refined(bench, rows, fits, progress)
+        good = _explaining(bench, fits, tolerant=tolerant)
     if not good:
         return verdict
     best, together = min(good, key=lambda found: found[1].held_out_error)
@@ -144,6 +157,37 @@ def _fitted_pair(bench: Bench, pair: Pair) -> Fitted | None:
         return fit_model(bench.study, bench.data, placements, start, base.train.scale, base=base)
     except ModelError:
         return None
+
+
+def _refined(
+    bench: Bench, rows: Sequence[Ranked], fits: Sequence[tuple[Pair, Fitted]], progress: Progress
+) -> tuple[list[Ranked], list[tuple[Pair, Fitted]]]:
+    """Rows and fitted pairs, with refinements of the effects of the best pair.
+
+    Beside a refinement stands the other effect, or the one of its family that alone fits best: of
+    nearly parallel directions only one is in a pair, and the finer law may be the one that is left.
+    """
+    best, _ = min(fits, key=lambda found: found[1].held_out_error)
+    both = (best.one, best.other)
+    added = refinements(bench.study, bench.data, bench.base, rows, both)
+    promising = [
+        (row, beside)
+        for row in added
+        for beside in both
+        if row.placement.effect.refines != beside.effect or row.port != beside.port
+        if (pair := _pair(row, beside)) is not None
+        if promises_more(pair.explained, best.explained)
+    ]
+    kin = [(row, _best_of_family(beside, rows)) for row, beside in promising]
+    pairs = [pair for row, beside in dict.fromkeys(promising + kin) if (pair := _pair(row, beside))]
+    return [*rows, *added], [*fits, *_fitted(bench, pairs[:MOST_PAIRS], progress)]
+
+
+def _best_of_family(one: Ranked, rows: Sequence[Ranked]) -> Ranked:
+    """The effect of a row's family at its port that alone leaves the smallest held-out error."""
+    family = one.placement.effect.family
+    kin = [r for r in rows if family and r.placement.effect.family == family and r.port == one.port]
+    return min(kin, key=lambda row: row.held_out_error, default=one)
 
 
 def _explaining(

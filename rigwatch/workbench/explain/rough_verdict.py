@@ -44,8 +44,11 @@ examined, a single effect that was named correctly leaves up to 1.3 times the he
 def much_left(base: Fitted, floor: NoiseFloor, fitted: Fitted) -> bool:
     """Whether the residual is so large that the fitted effects cannot be all that is missing.
 
-    Samples at an effect's discontinuities do not count, see `discontinuities.py`.
+    Samples at an effect's discontinuities do not count, see `discontinuities.py`, nor does the
+    model's own error along this motion, see `error_spectrum.py`.
     """
+    if floor.own_error is not None:
+        return floor.beyond_own_error(base.held_out, fitted.held_out, fitted.calm) > SHARE
     left, before = (floor.ratio(fit, fitted.calm) for fit in (fitted.held_out, base.held_out))
     return left > MUCH and left**2 - 1 > SHARE * (before**2 - 1)
 

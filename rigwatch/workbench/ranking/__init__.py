@@ -12,7 +12,11 @@ from rigwatch.workbench.ranking.nested_start import refit_nested
 from rigwatch.workbench.ranking.paired_test import difference
 from rigwatch.workbench.ranking.rank import AGAIN, MUCH_WORSE, rank
 from rigwatch.workbench.ranking.ranked import SAME, SIMILAR, Ranked, accepted_from, in_order
-from rigwatch.workbench.ranking.refinements import with_refinements
+from rigwatch.workbench.ranking.refinements import (
+    promises_more,
+    refinements,
+    with_refinements,
+)
 from rigwatch.workbench.ranking.refitting import (
     Progress,
     no_progress,
@@ -41,9 +45,11 @@ __all__ = [
     "left_over",
     "no_progress",
     "own_floor",
+    "promises_more",
     "rank",
     "rank_all",
     "rank_only",
+    "refinements",
     "refit",
     "refit_nested",
     "score_all",

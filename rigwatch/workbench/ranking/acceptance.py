@@ -90,10 +90,14 @@ def _names_at_neutral(expression: str, strength: str, neutral: float) -> frozens
 
 
 def left_over(base: Fitted, row: Ranked, floor: NoiseFloor, *, tolerant: bool = False) -> float:
-    """Share of the error above the floor that a row leaves, ignoring its discontinuities."""
+    """Share of the error above the floor that a row leaves, ignoring its discontinuities.
+
+    If `tolerant`, an error at the noise floor counts as zero, and so does the model's own error.
+    """
     assert row.fitted is not None
     before, after = base.held_out, row.fitted.held_out
-    return floor.left_over(before, after, row.fitted.calm, tolerant=tolerant)
+    left = floor.left_over(before, after, row.fitted.calm, tolerant=tolerant)
+    return min(left, floor.beyond_own_error(before, after, row.fitted.calm)) if tolerant else left
 
 
 def leaves_nothing(row: Ranked, base: Fitted, floor: NoiseFloor) -> bool:

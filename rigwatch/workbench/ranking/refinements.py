@@ -17,6 +17,8 @@ from rigwatch.workbench.study import Study
 
 REST = 0.25
 """Share of the energy left by an effect that its refinement must explain, to first order."""
+MOST = 3
+"""Refinements that are fitted: to first order, where a shape begins, they hardly differ."""
 
 
 def with_refinements(  # noqa: PLR0917 -- they belong together
@@ -35,27 +37,41 @@ def with_refinements(  # noqa: PLR0917 -- they belong together
         best: its best effect.
         progress: called with a line of text as each fit begins.
     """
-    added = [row for row in _scored(study, data, base, rows, best) if _promises_more(row, best)]
+    known = refinements(study, data, base, rows, (best,))
+    added = sorted(known, key=lambda row: -row.explained)[:MOST]
     for row in added:
         progress(f"fitting {row.label}, which refines {best.label}")
         refit(study, data, base, row)
-        for other in rows:
-            other.cosines[row.label] = row.cosines.get(other.label, 0.0)
-            other.signed_cosines[row.label] = row.signed_cosines.get(other.label, 0.0)
     return in_order([*rows, *added])
 
 
-def _scored(
-    study: Study, data: Data, base: Fitted, rows: Sequence[Ranked], best: Ranked
+def refinements(
+    study: Study, data: Data, base: Fitted, rows: Sequence[Ranked], refined: Sequence[Ranked]
 ) -> list[Ranked]:
-    """Refinements of the best effect that are not ranked yet, scored together with all others."""
-    more = refining(study, data.train, best.effect, best.port)
+    """Refinements of some effects that are not ranked yet, scored together with all others.
+
+    Args:
+        study, data, base: the study, its recordings and the fitted model.
+        rows: the ranking; the rows get their cosines with the refinements.
+        refined: the effects.
+    """
+    more = [c for row in refined for c in refining(study, data.train, row.effect, row.port)]
     new = {candidate.label for candidate in more} - {row.label for row in rows}
     if not new:
         return []
     found = scored(study, data, base, [*candidates(study, data.train), *more])
-    return [row for row in found if row.label in new]
+    added = [row for row in found if row.label in new]
+    for row in added:
+        for other in rows:
+            other.cosines[row.label] = row.cosines.get(other.label, 0.0)
+            other.signed_cosines[row.label] = row.signed_cosines.get(other.label, 0.0)
+    return added
 
 
-def _promises_more(row: Ranked, best: Ranked) -> bool:
-    return row.explained - best.explained > REST * (1 - best.explained)
+def promises_more(refined: float, coarse: float) -> bool:
+    """Whether a refinement explains so much more, to first order, that it is worth a fit.
+
+    Args:
+        refined, coarse: shares of the residual's energy that are explained with and without it.
+    """
+    return refined - coarse > REST * (1 - coarse)
