@@ -42,7 +42,7 @@ from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.workbench.compare.preparation import Bench, bench_of
-from rigwatch.workbench.data.noise_floor import quiet_scale
+from rigwatch.workbench.data.noise.noise_floor import quiet_scale
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.explain.verdict import Verdict

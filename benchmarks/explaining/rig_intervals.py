@@ -14,7 +14,7 @@ from benchmarks.explaining.hidden_effects_rig import Case, simulated, study_of
 from benchmarks.explaining.rig_hidden import settings
 from rigwatch.workbench.compare.preparation import bench_of
 from rigwatch.workbench.compare.uncertainty_budget import added_variances
-from rigwatch.workbench.data.noise_floor import quiet_scale
+from rigwatch.workbench.data.noise.noise_floor import quiet_scale
 from rigwatch.workbench.fit.intervals import values
 from rigwatch.workbench.ranking.candidates import shapes_of
 from rigwatch.workbench.ranking.refitting import refit

@@ -111,9 +111,7 @@ def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench
     return Bench(study, data, base, _of_healthy(study, data, healthy, base, bare), bare)
 
 
-def _of_healthy(
-    study: Study, data: Data, healthy: Data, base: Fitted, bare: Fitted
-) -> NoiseFloor:
+def _of_healthy(study: Study, data: Data, healthy: Data, base: Fitted, bare: Fitted) -> NoiseFloor:
     """The noise floor from a healthy recording.
 
     An accepted effect may be part of the healthy rig, or unable to vanish (a delay has a lower

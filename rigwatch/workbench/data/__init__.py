@@ -1,13 +1,13 @@
 """A study's measured data: signals on one time grid, their scales, and the noise floor."""
 
 from rigwatch.workbench.data.columns import Columns, bridged, copies
-from rigwatch.workbench.data.error_spectrum import expected_error
 from rigwatch.workbench.data.healthy_elements import with_elements
 from rigwatch.workbench.data.motion import along_motion, predicts_along_motion
 from rigwatch.workbench.data.next_rows import with_next_rows
-from rigwatch.workbench.data.noise_floor import (
+from rigwatch.workbench.data.noise import (
     METHODS,
     NoiseFloor,
+    expected_error,
     find_period,
     from_residual,
     lowered,

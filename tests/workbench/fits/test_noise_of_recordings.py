@@ -10,8 +10,8 @@ from scipy.signal import welch
 from rigwatch.physics.engine.fit import Fit
 from rigwatch.physics.engine.fit.recording import Recording, joined
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.workbench.data.noise_floor import NoiseFloor, find_period, quiet_scale
-from rigwatch.workbench.data.quietest_band import quietest_band
+from rigwatch.workbench.data.noise.noise_floor import NoiseFloor, find_period, quiet_scale
+from rigwatch.workbench.data.noise.quietest_band import quietest_band
 from rigwatch.workbench.data.repeats import repeat_of
 
 NOISE, RATE = 1e-3, 200.0

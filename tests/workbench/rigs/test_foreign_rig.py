@@ -12,7 +12,7 @@ from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.workbench.compare.preparation import Bench, bench_of, determined_by_healthy
 from rigwatch.workbench.data.motion import along_motion
-from rigwatch.workbench.data.noise_floor import from_residual, quiet_scale
+from rigwatch.workbench.data.noise.noise_floor import from_residual, quiet_scale
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.study.study import Study

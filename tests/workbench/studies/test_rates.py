@@ -10,8 +10,8 @@ from rigwatch.wire.errors import ConfigError, ModelError
 from rigwatch.wire.typed_files.loading import parse
 from rigwatch.workbench.compare.compare import compare
 from rigwatch.workbench.data.columns import Columns
+from rigwatch.workbench.data.noise.quietest_band import quietest_band
 from rigwatch.workbench.data.one_rate import resampled
-from rigwatch.workbench.data.quietest_band import quietest_band
 from tests.workbench.machine import studied
 
 LINE = """

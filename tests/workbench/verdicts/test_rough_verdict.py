@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigwatch.workbench.data.noise_floor import NoiseFloor
+from rigwatch.workbench.data.noise.noise_floor import NoiseFloor
 from rigwatch.workbench.explain.adequacy import unchecked
 from rigwatch.workbench.explain.rough_verdict import (
     leaves_much,

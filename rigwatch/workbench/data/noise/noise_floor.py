@@ -13,8 +13,8 @@ import numpy as np
 from rigwatch.physics.engine.fit import Fit, Recording
 from rigwatch.physics.transfer import period_by_correlation, shortest_period
 from rigwatch.wire.arrays import BoolArray, FloatArray
-from rigwatch.workbench.data.error_spectrum import ErrorSpectrum
-from rigwatch.workbench.data.quietest_band import quietest_band
+from rigwatch.workbench.data.noise.error_spectrum import ErrorSpectrum
+from rigwatch.workbench.data.noise.quietest_band import quietest_band
 
 METHODS = {
     "periods": "differences between repeated periods of the excitation",

@@ -37,9 +37,7 @@ class ErrorSpectrum:
 
     energy: FloatArray
 
-    def beyond(
-        self, residuals: FloatArray, rms: FloatArray, at: BoolArray | None = None
-    ) -> float:
+    def beyond(self, residuals: FloatArray, rms: FloatArray, at: BoolArray | None = None) -> float:
         """Energy that residuals hold beyond the model's own error, in units of the noise floor.
 
         Args:

@@ -1,0 +1,60 @@
+"""The model's own error along a motion, by frequency, from its error along the healthy motion."""
+
+import numpy as np
+from scipy.signal import butter, sosfilt
+
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.workbench.data.noise.error_spectrum import ErrorSpectrum, expected_error
+
+RANDOM = np.random.default_rng(3)
+LENGTH = 4096
+
+
+def noise(rms: float, low: float, high: float) -> FloatArray:
+    """Noise in a band, given in shares of the Nyquist frequency, shape (n, 1)."""
+    found = sosfilt(
+        butter(4, (low, high), "bandpass", output="sos"), RANDOM.normal(size=2 * LENGTH)
+    )
+    found = found[LENGTH:, None]
+    return np.asarray(rms * found / found.std())
+
+
+SLOW, FAST = (0.02, 0.15), (0.3, 0.6)
+HEALTHY = noise(1.0, *SLOW) + noise(0.05, *FAST)
+CORNERED = noise(1.0, *SLOW) + noise(0.3, *FAST)
+"""A motion with six times as much at high frequencies as the healthy one."""
+ERROR = noise(0.01, *SLOW) + noise(0.03, *FAST)
+RMS = ERROR.std(axis=0)
+
+
+def expected() -> ErrorSpectrum:
+    found = expected_error(ERROR[None], HEALTHY, CORNERED)
+    assert found is not None
+    return found
+
+
+def test_an_error_that_grows_with_the_motion_in_its_band_is_its_own() -> None:
+    left = noise(0.01, *SLOW) + noise(0.15, *FAST)
+
+    assert expected().beyond(left[None], RMS) < 0.1 * (left.std() / RMS[0]) ** 2
+
+
+def test_the_same_error_where_the_healthy_motion_checks_the_model_is_not() -> None:
+    left = noise(0.15, *SLOW) + noise(0.03, *FAST)
+
+    assert expected().beyond(left[None], RMS) > 15
+
+
+def test_samples_that_do_not_count_hold_nothing() -> None:
+    left = noise(0.01, *SLOW)
+    left[1000:1010] += 3.0
+    calm = np.ones((1, LENGTH), np.bool_)
+    calm[0, 1000:1010] = False
+
+    assert expected().beyond(left[None], RMS) > 1
+    assert expected().beyond(left[None], RMS, calm) < 0.1
+
+
+def test_a_short_recording_has_no_spectrum() -> None:
+    assert expected_error(ERROR[None, :500], HEALTHY, CORNERED) is None
+    assert expected().beyond(ERROR[None, :500], RMS) == np.inf
