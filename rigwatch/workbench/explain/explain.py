@@ -228,12 +228,13 @@ def _refined(
     if not much_left(bench.base, bench.floor, best.fitted):
         return rows, verdict
     known = {row.label for row in rows}
-    rows = with_refinements(bench.study, bench.data, bench.base, rows, best, progress)
-    for row in rows:
-        if row.label not in known and _explains_the_rest(bench, row):
-            # The coarser effect is named in place of a finer one while other physics is missing.
-            best.accepted, best.reason = False, f"leaves much that {row.label} explains"
-    return rows, verdict if len(rows) == len(known) else credible_verdict(bench, rows)
+    refined = with_refinements(bench.study, bench.data, bench.base, rows, best, progress)
+    finer = [row for row in refined if row.label not in known and _explains_the_rest(bench, row)]
+    if not finer:
+        return rows, verdict
+    # The coarser effect is named in place of a finer one while other physics is missing.
+    best.accepted, best.reason = False, f"leaves much that {finer[0].label} explains"
+    return refined, credible_verdict(bench, refined)
 
 
 def _explains_the_rest(bench: Bench, row: Ranked) -> bool:

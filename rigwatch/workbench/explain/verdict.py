@@ -46,6 +46,8 @@ CONTRADICTED = 2.0
 """Ratio of the training energy explained by another effect above which the best is in doubt."""
 CHANCE = 0.05
 """p-value of the best effect from which coloured noise explains the error as well."""
+FAVOURED = 0.125
+"""Energy, in that of the healthy error, by which the model's own error may favour an effect."""
 MOST_OF_IT = 0.75
 """Share of the best effect's gain that an effect of lower order needs to be named instead."""
 
@@ -104,8 +106,10 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
     assert best.fitted is not None
     trusted = floor.reached(best.fitted.held_out)
     members, rivals = _undistinguished(best, rows, trusted=trusted)
-    if not trusted and floor.method == "healthy motion":
-        rivals = (*rivals, *_at_other_ports(best, rows, (*members, *rivals)))
+    if floor.method == "healthy motion":
+        known = (*members, *rivals)
+        more = _as_near_as_own_error(best, rows, known, floor)
+        rivals = (*rivals, *(more if trusted else _at_other_ports(best, rows, known)))
     evidence = Evidence(
         floor.left_over(base.held_out, best.fitted.held_out), _margin(best, rows, members + rivals)
     )
@@ -310,6 +314,29 @@ def _at_other_ports(
         and best.cosines.get(row.label, 0.0) > SIMILAR
         and row.held_out_error < MUCH_WORSE * best.held_out_error
         and (row.gain or 0.0) > NEARLY * (best.gain or 0.0)
+    )
+
+
+def _as_near_as_own_error(
+    best: Ranked, rows: Sequence[Ranked], known: tuple[str, ...], floor: NoiseFloor
+) -> tuple[str, ...]:
+    """Labels of similar effects that reach the floor too, so near that model error may decide.
+
+    The model's own error is the same in every block, so that a paired test takes it for evidence.
+    """
+    assert best.fitted is not None
+    most = floor.ratio(best.fitted.held_out) ** 2 + FAVOURED
+    return tuple(
+        row.label
+        for row in rows
+        if row.accepted
+        and row.fitted is not None
+        and row.label not in known
+        and row.free <= best.free
+        and best.cosines.get(row.label, 0.0) > SIMILAR
+        and not _same_family(best, row)
+        and floor.ratio(row.fitted.held_out) ** 2 < most
+        and floor.reached(row.fitted.held_out)
     )
 
 

@@ -29,7 +29,7 @@ def with_refinements(  # noqa: PLR0917 -- they belong together
     best: Ranked,
     progress: Progress,
 ) -> list[Ranked]:
-    """The ranking with promising refinements of its best effect, fitted and judged.
+    """The ranking with refinements of its best effect, fitted and judged.
 
     Args:
         study, data, base: the study, its recordings and the fitted model.
