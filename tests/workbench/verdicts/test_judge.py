@@ -555,3 +555,33 @@ def test_what_a_set_bends_into_a_similar_law_is_not_named_alone(
     found = with_similar(named, rows)
     assert found.word == word
     assert found.rivals == ((label,) if word == "undetermined" else ())
+
+
+# ---- the model's own error --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("error", "floor", "rivals"),
+    [
+        (1.03, MOTION, ("leakage@between",)),
+        (1.04, MOTION, ("leakage@between",)),
+        (1.06, MOTION, ()),
+        (1.03, PERIODS, ()),
+    ],
+    ids=["near", "at its limit", "above the floor", "noise alone"],
+)
+def test_of_two_effects_that_leave_nothing_the_models_own_error_may_favour_one(
+    error: float, floor: NoiseFloor, rivals: tuple[str, ...]
+) -> None:
+    gain = best("gain@drive", 0.99, cosines={"leakage@between": 0.9})
+
+    found = judge(base(1.4), [gain, row("leakage@between", error, behind=9.0)], floor)
+
+    assert found.rivals == rivals
+    assert found.word == ("undetermined" if rivals else "missing_effect")
+
+
+def test_an_effect_far_better_within_the_models_own_error_has_no_rival() -> None:
+    lag = best("lag@sensor", 0.7, cosines={"gain@drive": 0.9})
+
+    assert judge(base(3.0), [lag, row("gain@drive", 0.99, behind=9.0)], MOTION).rivals == ()
