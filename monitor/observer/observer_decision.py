@@ -53,6 +53,7 @@ from monitor.observer.decision_state import (
     USUAL_FRICTION,
     USUAL_LASTING,
     USUAL_MEDIUM,
+    USUAL_RESPONSE,
     USUAL_SHORT,
     VERDICT,
     VISCOUS,
@@ -293,7 +294,9 @@ def _one(  # noqa: PLR0917 -- a kernel
     allowed = _friction_limit(usual[USUAL_FRICTION], rules)
     largest = max(np.sqrt(short), np.sqrt(medium), deviations / allowed)
     lasting = lasting_energy(kept, spread**2 * usual[USUAL_LASTING] * margin)
-    out[DEVIATION, k] = max(largest, np.sqrt(out[SENSORS, k]), np.sqrt(lasting))
+    # A motion of another size than under the same drive before: slow evidence, never at once.
+    response = min(usual[USUAL_RESPONSE], SURE)
+    out[DEVIATION, k] = max(largest, np.sqrt(out[SENSORS, k]), np.sqrt(lasting), response)
     away = out[DEVIATION, k] > 1.0
     count[QUIET] = 0 if away else count[QUIET] + 1
     count[ABOVE] = count[ABOVE] + 1 if away else 0

@@ -4,8 +4,9 @@ What equations leave of a healthy rig depends on the motion and hardly on anythi
 motion that was recorded at commissioning is therefore compared with what was left of it then,
 which is far less than the worst of all motions. A smaller motion of the same kind, as faults of the
 drive cause, leaves no more than that. Under a drive that was recorded a healthy rig moves as it did
-then, so that any other steady motion is compared with that recording as well. Of all others, and
-while the motion changes, the extremes of a healthy rig are not known.
+then, so that any other steady motion is compared with that recording as well, and that its size is
+another one is evidence of a change by itself. Of all others, and while the motion changes, the
+extremes of a healthy rig are not known.
 """
 
 from collections.abc import Iterator
@@ -34,6 +35,8 @@ NARROWEST = 2.0
 """Narrowness above which a spectrum is not determined."""
 STEADY = 0.9
 """Share of a recording that is the same motion as its median, if it is a steady one."""
+STEEPEST = 6.0
+"""Largest relative change of a healthy motion's size over that of its drive's frequency."""
 
 
 class Extremes(NamedTuple):
@@ -75,7 +78,10 @@ class UsualError:
         self._smooth = _Smooth(rate)
 
     def update(self, seen: Spectrum, drive: FloatArray, bands: FloatArray) -> FloatArray:
-        """The extremes after each sample, infinite where they are not known, shape (4, n).
+        """The extremes after each sample and the deviation of the motion's size, shape (5, n).
+
+        Extremes are infinite where they are not known. The deviation is 1 at its limit, and 0 where
+        the drive was not recorded.
 
         Args:
             seen: the motion.
@@ -97,7 +103,23 @@ class UsualError:
             driven[:, other] = np.maximum(driven[:, other], np.array(motion.extremes)[:, None])
         for known in (smaller, driven):
             found = np.where(found > 0.0, found, known)
-        return np.where(steady & (found > 0.0), found, np.inf)
+        extremes = np.where(steady & (found > 0.0), found, np.inf)
+        return np.vstack([extremes, self._response(smooth, settled, drive, bands)])
+
+    def _response(
+        self, smooth: Spectrum, settled: NDArray[np.bool_], drive: FloatArray, bands: FloatArray
+    ) -> FloatArray:
+        """Deviation of the motion's size from that under the same drive, shape (n,)."""
+        nearest = np.full(settled.size, np.inf)
+        size, energy = np.maximum(smooth.size, 1e-300), bands.sum(axis=1)
+        for motion in self._known:
+            faster = np.abs(drive - motion.drive) / max(motion.drive, 1e-300)
+            same = settled & _driven(bands, motion) & (faster <= DRIVE)
+            healthy = motion.size * np.sqrt(energy[same] / max(sum(motion.bands), 1e-300))
+            allowed = np.log1p(SIZE + STEEPEST * faster[same])
+            off = np.abs(np.log(size[same] / healthy)) / allowed
+            nearest[same] = np.minimum(nearest[same], off)
+        return np.where(np.isfinite(nearest), nearest, 0.0)
 
 
 def steady_motion(
