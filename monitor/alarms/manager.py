@@ -120,6 +120,15 @@ class AlarmManager:
         self._advance(t_ns)
         return self._take_announcements()
 
+    def set_back(self, by_ns: int) -> None:
+        """The clock of all times has been set back [ns]: what lasts ends as much sooner by it."""
+        self._due_ns = 0
+        self._flood.set_back(by_ns)
+        for alarm in self._alarms.values():
+            alarm.flaps.set_back(by_ns)
+            if alarm.shelved_until_ns:
+                alarm.shelved_until_ns -= by_ns
+
     def holds(self, name: str) -> bool:
         """Whether the condition of `name` was last known to hold."""
         known = self._alarms.get(name)
