@@ -46,6 +46,7 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
             "rogue_client",
             "bombs",
             "fuzzing",
+            "fuzzed_requests",
             "replay",
             "windowed_least_squares",
         ),

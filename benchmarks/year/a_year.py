@@ -184,13 +184,15 @@ def _rows(done: Year, what: str, limit: float) -> list[Row]:
 
 def _memory_row(what: str, done: Year, name: str) -> Row:
     growth, at_end, looks = done.memory.growth(name)
+    late, _, late_looks = done.memory.growth(name, 0.25)
     year_percent = growth * len(done.memory.seen[name]) / max(1, looks)
     return Row(
         f"{what}: memory of {name}",
         f"{year_percent:+.2f} % a year",
         f"{MEMORY_PERCENT:g} %",
         "",
-        f"{growth:+.2f} % over {looks} sessions, {at_end:.1f} MB at the end",
+        f"{growth:+.2f} % over {looks} sessions, {late:+.2f} % over the last {late_looks}, "
+        f"{at_end:.1f} MB at the end",
         passed=year_percent <= MEMORY_PERCENT,
     )
 

@@ -57,6 +57,11 @@ class FlapWatch:
         self._told = self.count
         return True
 
+    def set_back(self, by_ns: int) -> None:
+        """The clock of the time stamps has been set back [ns]."""
+        self._changed_ns -= by_ns
+        self._risen = deque((one - by_ns for one in self._risen), self._risen.maxlen)
+
     def end(self) -> None:
         """End the series."""
         self.holding, self.count, self._told = False, 0, 0

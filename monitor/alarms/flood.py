@@ -39,6 +39,10 @@ class FloodWatch:
         self.active = self.active or begins
         return begins
 
+    def set_back(self, by_ns: int) -> None:
+        """The clock of the time stamps has been set back [ns]."""
+        self._raised = deque((one - by_ns for one in self._raised), self._raised.maxlen)
+
     def end(self) -> None:
         """End the flood."""
         self.active = False

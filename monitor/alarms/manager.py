@@ -15,7 +15,7 @@ those that require stopping the rig are always shown. A chattering alarm is one 
 (`flapping.py`).
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 from monitor.alarms.debounce import Debouncer
@@ -38,6 +38,7 @@ from rigwatch.wire.messages import NOT_PROVED, Alarm, AlarmCommand, Event, Ident
 from rigwatch.wire.rig_config import AlarmSection
 
 Announcement = Alarm | Event
+Deadline = tuple[int, str, Callable[[AlarmInstance, int], None]]
 
 SHELF_LIFE_NS = 8 * 3600 * 1_000_000_000
 """Longest shelving: one shift, so that no alarm is forgotten on the shelf."""
@@ -118,6 +119,15 @@ class AlarmManager:
         """Process what is due by `t_ns` [ns], such as the end of a shelving."""
         self._advance(t_ns)
         return self._take_announcements()
+
+    def set_back(self, by_ns: int) -> None:
+        """The clock of all times has been set back [ns]: what lasts ends as much sooner by it."""
+        self._due_ns = 0
+        self._flood.set_back(by_ns)
+        for alarm in self._alarms.values():
+            alarm.flaps.set_back(by_ns)
+            if alarm.shelved_until_ns:
+                alarm.shelved_until_ns -= by_ns
 
     def holds(self, name: str) -> bool:
         """Whether the condition of `name` was last known to hold."""
@@ -339,29 +349,27 @@ class AlarmManager:
         if self._due_ns is None or to_ns < self._due_ns:
             return
         while due := [when for when in self._deadlines() if when[0] <= to_ns]:
-            t_ns, name = min(due)
-            if name == ALARM_FLOOD:
-                self._end_flood(t_ns)
-            elif self._alarms[name].flaps.ends_ns == t_ns:
-                self._end_series(self._alarms[name], t_ns)
-            else:
-                self._unshelve(self._alarms[name], t_ns, _SHELF_TIME_OVER)
-        self._due_ns = min((when for when, _ in self._deadlines()), default=None)
+            t_ns, name, end = min(due, key=lambda when: when[:2])
+            end(self._alarm(name), t_ns)
+        self._due_ns = min((when[0] for when in self._deadlines()), default=None)
 
-    def _deadlines(self) -> list[tuple[int, str]]:
-        shelved = [
-            (alarm.shelved_until_ns, alarm.name)
-            for alarm in self._alarms.values()
-            if alarm.shelved_until_ns
-        ]
-        flapping = [
-            (alarm.flaps.ends_ns, alarm.name)
-            for alarm in self._alarms.values()
-            if alarm.flaps.ends_ns is not None
-        ]
-        ends_ns = self._flood.ends_ns
-        flood = [] if ends_ns is None else [(ends_ns, ALARM_FLOOD)]
-        return [*flood, *shelved, *flapping]
+    def _deadlines(self) -> list[Deadline]:
+        """What ends by itself: when [ns], the alarm that it is about, and what ends it.
+
+        A flood's alarm may also chatter: its series ends apart from the flood.
+        """
+        found: list[Deadline] = []
+        if self._flood.ends_ns is not None:
+            found.append((self._flood.ends_ns, ALARM_FLOOD, self._end_flood))
+        for alarm in self._alarms.values():
+            if alarm.shelved_until_ns:
+                found.append((alarm.shelved_until_ns, alarm.name, self._end_shelf))
+            if alarm.flaps.ends_ns is not None:
+                found.append((alarm.flaps.ends_ns, alarm.name, self._end_series))
+        return found
+
+    def _end_shelf(self, alarm: AlarmInstance, t_ns: int) -> None:
+        self._unshelve(alarm, t_ns, _SHELF_TIME_OVER)
 
     def _end_series(self, alarm: AlarmInstance, t_ns: int) -> None:
         """End a chattering series: the alarm follows its condition again."""
@@ -369,9 +377,9 @@ class AlarmManager:
             self._publish(alarm, t_ns)
         alarm.flaps.end()
 
-    def _end_flood(self, t_ns: int) -> None:
+    def _end_flood(self, flood: AlarmInstance, t_ns: int) -> None:
         self._flood.end()
-        if self._alarm(ALARM_FLOOD).active:
+        if flood.active:
             self._set(ALARM_FLOOD, Occasion(t_ns=t_ns), active=False)
         for alarm in self._alarms.values():
             if alarm.grouped:

@@ -1,7 +1,11 @@
 """The monitor's position in the stream, from which it continues after a kill.
 
-Twenty bytes in a memory-mapped file: boot, seq, CRC-32. Writing needs no system call, and the
+Twenty bytes in a memory-mapped file: boot, seq, CRC-32. Writing never waits for the disk, and the
 kernel keeps the data when the process is killed.
+
+A process that writes to a page that its file can no longer take (the disk has become read-only, or
+somebody has emptied the file) is killed by the kernel. So the kernel itself copies the bytes into
+the page, out of a file in memory, and reports a failure.
 """
 
 import contextlib
@@ -30,26 +34,29 @@ class Cursor:
     def __init__(self, path: Path | str) -> None:
         self._path = Path(path)
         try:
-            self._bytes, self._file = _opened(self._path)
+            self._page, self._file = _opened(self._path)
         except OSError as error:
             raise SessionError(f"{path}: cannot be opened: {reason_of(error)}") from error
+        self._source = os.memfd_create("position", os.MFD_CLOEXEC)
+        self._content = _content(self._path)
 
     def keep(self) -> None:
-        """Put the position into its file again if somebody has removed it, or the disk was full."""
+        """Put the position into its file again if that has been removed, emptied or was full."""
         try:
-            if self._file is not None and self._path.stat().st_ino == self._file:
+            there = self._path.stat()
+            if there.st_ino == self._file and there.st_size >= _SIZE:
                 return
         except OSError:
             pass
         with contextlib.suppress(OSError):
             fresh, self._file = _opened(self._path)
-            fresh[:] = self._bytes[:]
-            self._bytes.close()
-            self._bytes = fresh
+            self._page.close()
+            self._page = fresh
+            self._put(self._content)
 
     def read(self) -> tuple[int, int] | None:
         """The stored position; None if there is none."""
-        found = stored_position(self._bytes[:])
+        found = stored_position(self._content)
         if found and not -1 <= found[1] <= LARGEST_SEQ:
             self.set_aside()
             return None
@@ -58,17 +65,26 @@ class Cursor:
     def set_aside(self) -> None:
         """Move the invalid content to a file beside it for inspection, and start afresh."""
         with contextlib.suppress(OSError):
-            self._path.with_name(f"{self._path.name}.set-aside").write_bytes(self._bytes[:])
-        self._bytes[:] = bytes(_SIZE)
+            self._path.with_name(f"{self._path.name}.set-aside").write_bytes(self._content)
+        self._put(bytes(_SIZE))
 
     def write(self, boot: int, seq: int) -> None:
         """Record that sample `seq` of `boot` and all before it are processed."""
         data = _POSITION.pack(boot, seq)
-        self._bytes[:] = data + _CRC.pack(zlib.crc32(data))
+        self._put(data + _CRC.pack(zlib.crc32(data)))
+
+    def _put(self, content: bytes) -> None:
+        self._content = content
+        os.pwrite(self._source, content, 0)
+        try:
+            os.preadv(self._source, [self._page], 0)
+        except OSError:
+            self._file = None  # `keep` opens it again
 
     def close(self) -> None:
         """Close the file."""
-        self._bytes.close()
+        self._page.close()
+        os.close(self._source)
 
 
 def stored_position(data: bytes) -> tuple[int, int] | None:
@@ -92,10 +108,14 @@ def _opened(path: Path) -> tuple[mmap.mmap, int | None]:
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EROFS):
             raise
-    memory = mmap.mmap(-1, _SIZE)
-    with contextlib.suppress(OSError):
-        memory[:] = path.read_bytes()[:_SIZE].ljust(_SIZE, b"\0")
-    return memory, None
+    return mmap.mmap(-1, _SIZE), None
+
+
+def _content(path: Path) -> bytes:
+    """The file's bytes; zeros where there are none."""
+    with contextlib.suppress(OSError), path.open("rb") as opened:
+        return opened.read(_SIZE).ljust(_SIZE, b"\0")
+    return bytes(_SIZE)
 
 
 def _mapped(path: Path) -> tuple[mmap.mmap, int]:

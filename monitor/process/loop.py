@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 from monitor.alarms import AlarmJournal, Announcement, Occasion, just_returned
@@ -22,6 +23,7 @@ from monitor.process.link_watch import LinkWatch, Seen, device_reports, disk_rep
 from monitor.process.model_requests import ModelDesk, Place
 from monitor.process.operator_desk import OperatorDesk
 from monitor.process.presence import Presence
+from monitor.process.rig_time import RigTime
 from monitor.process.startup_grace import Patience
 from monitor.signals import MONITOR_RESET
 from rigwatch.wire.bus import Bus, CommandCheck, joined, serve_alarm_list
@@ -82,6 +84,7 @@ class MonitorProcess:
         self._alone, self._journal, self._cursor = _opened(section.journal)
         self._done = self._cursor.read() if self._cursor else None
         self._stale_after = config.stale_after
+        self._time = RigTime(*both_clocks())
         self._links = LinkWatch(self._stale_after)
         self._keys = KeyWatch(config.bus.security.keys)
         self._health = HealthBook("monitor")
@@ -147,20 +150,29 @@ class MonitorProcess:
 
     def look_around(self) -> None:
         """Execute commands, check the link, publish the health."""
-        for announced in self._operators.execute(self.rig.alarms, time.time_ns()):
+        now_ns = self._now_ns()
+        for announced in self._operators.execute(self.rig.alarms, now_ns):
             self.say(announced)
         self._change_models()
         for event in self._explainer.results():
             self.bus.publish(EVENTS, event)
         seen = self._seen()
-        self.say(self.rig.alarms.pass_to(seen.t_ns))
+        self.say(self.rig.alarms.pass_to(now_ns))
         for name, occasion, holds in self._reports(seen):
             if self.rig.alarms.holds(name) != holds:
-                self.say(self.rig.alarms.report(name, occasion, active=holds))
+                at = replace(occasion, t_ns=now_ns)
+                self.say(self.rig.alarms.report(name, at, active=holds))
         self._announce_router(seen)
         self._announce_clock_step(seen)
         if self._health.is_due(seen.monotonic_ns):
             self._tell_health(seen)
+
+    def _now_ns(self, sample_ns: int | None = None) -> int:
+        """The time by which alarms count [ns]; `sample_ns` is that of a sample that has come."""
+        wall_ns, monotonic_ns = both_clocks()
+        if back_ns := self._time.set_back(wall_ns, monotonic_ns, sample_ns):
+            self.rig.alarms.set_back(back_ns)
+        return self._time.now(monotonic_ns)
 
     def _reports(self, seen: Seen) -> Iterator[tuple[str, Occasion, bool]]:
         """Name, occasion and state of the alarms that no sample raises."""
@@ -226,6 +238,7 @@ class MonitorProcess:
 
     def _judge(self, block: SampleBlock) -> None:
         self._judged_ns = int(block.t_ns[-1])
+        self._now_ns(self._judged_ns)
         self._delivered_s += len(block) / self.rig.model.sample_rate
         known = self._known_of(block)
         try:

@@ -62,7 +62,8 @@ class Authority:
             raise KeysError(f"{folder}: holds an authority already, expected a new folder")
         key = ec.generate_private_key(ec.SECP256R1())
         name = _name(f"rigwatch authority of {rig}")
-        builder = _builder(name, name, key, AUTHORITY_DAYS)
+        ends = datetime.now(UTC) + timedelta(days=AUTHORITY_DAYS)
+        builder = _builder(name, name, key, ends)
         builder = builder.add_extension(
             x509.BasicConstraints(ca=True, path_length=0), critical=True
         )
@@ -75,24 +76,25 @@ class Authority:
     def issue(self, name: str, role: str, addresses: Iterable[str] = ()) -> Issued:
         """Issue a certificate for `name` in `role`; a previous one is revoked.
 
+        It ends with the authority at the latest, as no link is made with it after that.
+
         Args:
             name: such as "daq" or "ann".
             role: one of `ROLES`.
             addresses: further names or addresses of the router's machine.
 
         Raises:
-            KeysError: the role is unknown, the name is none, or the folder cannot be written.
+            KeysError: the role is unknown, the name is none, the authority has ended, or the folder
+                cannot be written.
         """
         if role not in ROLES:
             raise KeysError(f"role: found {role!r}, expected one of {', '.join(ROLES)}")
         _check_name("name", name)
         serial = 1 + max((one.serial for one in self.register.issued), default=0)
-        ends = datetime.now(UTC) + timedelta(days=CERTIFICATE_DAYS)
+        ends = self._end()
         issued = Issued(name, role, serial, ends.strftime("%Y-%m-%d"))
         key = ec.generate_private_key(ec.SECP256R1())
-        builder = _builder(
-            _name(issued.common_name), self._certificate.subject, key, CERTIFICATE_DAYS
-        )
+        builder = _builder(_name(issued.common_name), self._certificate.subject, key, ends)
         builder = builder.add_extension(_alternative_names(role, addresses), critical=False)
         usage = x509.ExtendedKeyUsage(
             [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]
@@ -103,6 +105,14 @@ class Authority:
         _write(self.folder, public.name, _pem(certificate))
         self._save((*self._without(name), issued))
         return issued
+
+    def _end(self) -> datetime:
+        """When a certificate that is issued now ends."""
+        now, last = datetime.now(UTC), self._certificate.not_valid_after_utc
+        if now > last:
+            renewed = "make a new one with `rigwatch keys new` and issue all certificates anew"
+            raise KeysError(f"{self.folder}: the authority has ended on {last:%Y-%m-%d}: {renewed}")
+        return min(now + timedelta(days=CERTIFICATE_DAYS), last)
 
     def revoke(self, name: str) -> Issued:
         """Revoke the certificate of `name`.
@@ -138,7 +148,7 @@ def _name(text: str) -> x509.Name:
 
 
 def _builder(
-    subject: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePrivateKey, days: int
+    subject: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePrivateKey, ends: datetime
 ) -> x509.CertificateBuilder:
     now = datetime.now(UTC)
     return (
@@ -148,7 +158,7 @@ def _builder(
         .public_key(key.public_key())
         .serial_number(x509.random_serial_number())
         .not_valid_before(now - timedelta(hours=1))
-        .not_valid_after(now + timedelta(days=days))
+        .not_valid_after(ends)
     )
 
 

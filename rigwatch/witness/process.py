@@ -34,6 +34,7 @@ from rigwatch.wire.rig_config import RigConfig, SecuritySection, WitnessSection
 from rigwatch.witness.announcer import Announcer
 from rigwatch.witness.kept_alarm import KeptAlarm, beside_journal
 from rigwatch.witness.outputs import Outputs
+from rigwatch.witness.silence import Silence
 from rigwatch.witness.stale_alarm import StaleAlarm
 
 PROCESS = "witness"
@@ -75,7 +76,7 @@ class Witness:
         self._estimates = bus.subscribe_lossy(ESTIMATES)
         self._alarms = bus.listen(ALARMS)
         self._stale_after = settings.stale_after or LEAST_SILENCE
-        self._heard_at = now + max(0.0, FOR_MONITOR - self._stale_after)
+        self._silence = Silence(now + max(0.0, FOR_MONITOR - self._stale_after))
         self._stale = StaleAlarm(CommandCheck(bus, security), kept)
         # An alarm of an earlier run ends with an estimate, not with the patience for the first.
         self._unheard = self._stale.holds
@@ -88,8 +89,9 @@ class Witness:
     def turn(self, now: float, t_ns: int) -> None:
         """Check once; `now` is monotonic time [s], `t_ns` Unix time [ns]."""
         if self._estimates.drain():
-            self._heard_at, self._unheard = now, False
-        silent = now - self._heard_at
+            self._silence.end(now)
+            self._unheard = False
+        silent = self._silence.counted(now)
         stale = self._unheard or silent > self._stale_after
         for alarm in self._stale.judge(stale, silent, t_ns, self._link_trouble):
             self._bus.publish(ALARMS, alarm)
@@ -119,7 +121,7 @@ class Witness:
                 self._bus.publish(ALARMS if isinstance(said, Alarm) else EVENTS, said)
 
     def _report(self, now: float, t_ns: int) -> None:
-        silent = max(0.0, now - self._heard_at)
+        silent = self._silence.age(now)
         stale = self._stale.holds
         counters = {
             "estimates_silent_s": silent,

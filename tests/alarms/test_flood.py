@@ -152,3 +152,19 @@ def test_a_flood_never_groups_an_alarm_that_asks_for_the_rig_to_be_stopped():
         raised(alarms, 15)
         said = alarms.report(name, Occasion("rig", t_ns=time_of(20 * 256)), active=True)
         assert steps(said) == [(name, "unacknowledged", -1)]
+
+
+def test_a_flood_that_comes_and_goes_ends_like_any_other_alarm():
+    """The monitor's clock an hour ahead of the samples' ends each flood at once."""
+    alarms = AlarmManager()
+    raised(alarms, 16, apart=25)
+    hour = 3600 * 256
+    for i in range(16, 32):
+        alarms.pass_to(time_of(hour + i))
+        at = Occasion("rig", 7, t_ns=time_of(i * 25))
+        alarms.report(f"sensor_stuck.ch{i}", at, active=True)
+    alarms.pass_to(time_of(2 * hour))
+    states = {one.name: one.state for one in alarms.standing()}
+    assert states.pop("alarm_flood") == "cleared_unacknowledged"
+    assert set(states.values()) == {"unacknowledged"}
+    assert len(states) == 32

@@ -2,13 +2,14 @@
 
 import stat
 from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 
 from rigwatch.commands import main
 from rigwatch.keys import Authority
-from rigwatch.wire.access import ROLES
+from rigwatch.wire.access import ROLES, ending_soon, read_register
 from rigwatch.wire.bus import Bus, connect, open_router
 from rigwatch.wire.errors import BusError, ConfigError, KeysError
 from rigwatch.wire.messages import (
@@ -200,3 +201,18 @@ def test_the_command_makes_issues_revokes_and_shows(
                   ["issue", str(folder), "a" * 41, "--role", "operator"]):  # fmt: skip
         assert main(["keys", *wrong]) == 2
     assert capsys.readouterr().err.count("\n") == 6
+
+
+def test_a_certificate_ends_with_its_authority_and_none_is_issued_after_that(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ends = datetime.now(UTC) + timedelta(days=20)
+    monkeypatch.setattr("rigwatch.keys.authority.AUTHORITY_DAYS", 20)
+    issued = Authority.create(tmp_path / "keys", "bench").issue("daq", "daq")
+    assert issued.ends in {f"{ends:%Y-%m-%d}", f"{datetime.now(UTC) + timedelta(days=20):%Y-%m-%d}"}
+    # So a month before, the alarm of certificates that end tells of the authority too.
+    assert ending_soon(read_register(tmp_path / "keys"), ends.date())
+    monkeypatch.setattr("rigwatch.keys.authority.AUTHORITY_DAYS", -1 / 1440)
+    ended = Authority.create(tmp_path / "ended", "bench")
+    with pytest.raises(KeysError, match=r"ended: the authority has ended on .*`rigwatch keys new`"):
+        ended.issue("daq", "daq")

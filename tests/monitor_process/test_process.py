@@ -16,8 +16,9 @@ from monitor.process.key_watch import KeyWatch
 from monitor.process.link_watch import LinkWatch, Seen
 from monitor.process.loop import MonitorProcess, suitable_model
 from rigwatch.wire.access import REGISTER, Issued, Register, signer_of
+from rigwatch.wire.bus.commands import alarm_command
 from rigwatch.wire.bus.commands.alarm_command import command_alarms
-from rigwatch.wire.bus.commands.alarm_list import ask_alarm_list
+from rigwatch.wire.bus.commands.alarm_list import ask_alarm_list, serve_alarm_list
 from rigwatch.wire.bus.commands.command_check import signed
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.bus.subscription import Subscription
@@ -252,6 +253,42 @@ def test_of_two_operators_at_once_one_is_obeyed_and_only_the_other_is_refused(
     assert len(obeyed) == 1
     assert refused.keys() == {"ann", "bob"} - obeyed
     assert [*refused.values()] == ["acknowledge of disk refused: it is acknowledged"]
+
+
+def test_a_command_that_dies_with_its_monitor_reaches_the_next_or_is_told(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(alarm_command, "TIMEOUT", 0.6)
+    at = Occasion("rig", 7, 0, time.time_ns())
+    bench.monitor.say(bench.monitor.rig.alarms.report("disk", at, active=True))
+    told: list[object] = []
+
+    def acknowledge() -> None:
+        try:
+            told.append(
+                command_alarms(bench.observer, AlarmCommand("disk", "acknowledge", "ann", 1))
+            )
+        except BusError as error:
+            told.append(str(error))
+
+    def sent() -> threading.Thread:
+        thread = threading.Thread(target=acknowledge)
+        thread.start()
+        eventually(lambda: len(bench.monitor._operators._commands) == 1, "the command")
+        bench.kill()
+        return thread
+
+    waiting = sent()
+    # A witness answers for the list of alarms too, and executes none of the monitor's.
+    serve_alarm_list(bench.network.bus("bench", "witness"), list)
+    waiting.join()
+    assert told == ["no monitor of rig bench answers: start `rigwatch monitor`"]
+    bench.start()
+    waiting = sent()
+    bench.start()
+    assert wait_until(lambda: bench.turn() or not waiting.is_alive(), PATIENCE)
+    changes, refusal = told[1]  # type: ignore[misc]
+    assert ([one.state for one in changes], refusal) == (["acknowledged"], "")
 
 
 def test_a_killed_monitor_has_its_alarms_and_misses_no_sample(bench: Bench) -> None:

@@ -1,6 +1,7 @@
 """A stranger on the bus: what he sends is refused, and the monitor goes on."""
 
 import errno
+import os
 import shutil
 import threading
 import time
@@ -119,7 +120,7 @@ def test_a_position_that_no_device_reaches_is_none(tmp_path: Path, seq: int) -> 
     assert (tmp_path / "p.set-aside").exists()
 
 
-@pytest.mark.parametrize("why", ["removed", "full"])
+@pytest.mark.parametrize("why", ["removed", "emptied", "full"])
 def test_a_position_whose_file_is_gone_is_kept_in_a_new_one(
     why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -131,6 +132,9 @@ def test_a_position_whose_file_is_gone_is_kept_in_a_new_one(
     cursor.write(7, 11)
     if why == "removed":
         shutil.rmtree(path.parent)
+    if why == "emptied":
+        os.truncate(path, 0)
+        cursor.write(7, 11)  # the kernel ends a process that writes there itself
     cursor.keep()
     assert Cursor(path).read() == (7, 11)
     cursor.write(7, 12)

@@ -62,6 +62,28 @@ def test_a_silent_monitor_is_an_alarm_that_clears_and_stands_in_the_list(tmp_pat
     assert [one.state for one in ask_alarm_list(screen)] == ["cleared_unacknowledged"]
 
 
+def test_a_witness_that_was_held_up_blames_the_monitor_only_if_it_stays_silent() -> None:
+    network = MemoryNetwork()
+    monitor, shown = network.bus("r", "monitor"), network.bus("r", "dashboard").subscribe(ALARMS)
+    witness = Witness(WitnessSection(), network.bus("r", "witness"), 0.0)
+
+    def told_at(*turns: float) -> list[float]:
+        """When an alarm was raised, if the last estimate came with the first of the turns."""
+        monitor.publish(ESTIMATES, estimates(0))
+        found = []
+        for now in turns:
+            witness.turn(now, 1)
+            found += [now for one in shown.drain() if one.state == "unacknowledged"]
+        return found
+
+    # What waits for a process that was paused reaches it after its next turn.
+    assert told_at(0.0, 0.1, 6.0, 6.1) == []
+    assert told_at(6.2, 6.3, 12.0, *(12.0 + 0.1 * tenth for tenth in range(1, 10))) == []
+    assert told_at(13.0, 13.1, 19.0, 19.5, 20.0, 20.5, 21.0) == [20.0]
+    # A disk that holds up each turn is no excuse.
+    assert told_at(30.0, 32.0, 34.0, 36.0) == [34.0]
+
+
 def test_a_monitor_that_is_not_heard_for_want_of_a_router_says_so() -> None:
     network = MemoryNetwork()
     witness = Witness(WitnessSection(), network.bus("r", "witness"), 0.0)

@@ -26,11 +26,17 @@ def run(arguments: argparse.Namespace) -> int:
 
 def print_register(register: "Register", as_json: bool) -> None:
     """The certificates, one a line or as JSON."""
+    from datetime import UTC, datetime
+
     import msgspec
+
+    from rigwatch.wire.access import days_left
 
     if as_json:
         print(msgspec.json.encode(register).decode())
         return
+    today = datetime.now(UTC).date()
     for one in register.issued:
-        state = "revoked" if one.revoked else f"valid until {one.ends}"
+        validity = "valid until" if days_left(one, today) >= 0 else "ended on"
+        state = "revoked" if one.revoked else f"{validity} {one.ends}"
         print(f"{one.common_name:20} {one.role:10} {state}")

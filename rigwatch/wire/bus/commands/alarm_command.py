@@ -4,12 +4,21 @@ import time
 from dataclasses import dataclass, field
 
 from rigwatch.wire.bus.bus import Bus
-from rigwatch.wire.bus.commands.alarm_list import ask_alarm_list
+from rigwatch.wire.bus.commands.alarm_list import ask_alarm_list, no_monitor
 from rigwatch.wire.bus.commands.command_check import signed
 from rigwatch.wire.bus.commands.refusal import refusal_of
+from rigwatch.wire.bus.message_ring import SAID_KEY
 from rigwatch.wire.bus.subscription import Subscription
 from rigwatch.wire.errors import BusError
-from rigwatch.wire.messages import ALARMS, COMMANDS, EVENTS, Alarm, AlarmCommand
+from rigwatch.wire.messages import (
+    ALARMS,
+    COMMANDS,
+    EVENTS,
+    EVERY_ALARM,
+    MONITOR_STALE,
+    Alarm,
+    AlarmCommand,
+)
 
 TIMEOUT = 3.0
 SETTLE = 0.2
@@ -35,7 +44,8 @@ class _Answer:
 def command_alarms(bus: Bus, command: AlarmCommand) -> tuple[list[Alarm], str]:
     """Sign and send a command; the transitions in the monitor's reply, and the reason of a refusal.
 
-    A command that may have been lost with the link, as when the router opens anew, is sent again.
+    A command that may have been lost with the link, as when the router opens anew, or with a
+    monitor that has started anew meanwhile, is sent again.
 
     Raises:
         BusError: no monitor answers.
@@ -43,9 +53,12 @@ def command_alarms(bus: Bus, command: AlarmCommand) -> tuple[list[Alarm], str]:
     """
     changes, events = bus.subscribe(ALARMS), bus.subscribe(EVENTS)
     try:
+        there = _monitors(bus)
         answer = _answer_to(bus, command, changes, events)
-        if answer.interrupted and not answer:
+        if not answer and (answer.interrupted or _monitors(bus) != there):
             answer = _answer_to(bus, command, changes, events)
+        if not answer and not _monitors(bus):
+            raise no_monitor(bus)
         return answer.changed, answer.refusal
     finally:
         changes.close()
@@ -55,7 +68,7 @@ def command_alarms(bus: Bus, command: AlarmCommand) -> tuple[list[Alarm], str]:
 def _answer_to(
     bus: Bus, command: AlarmCommand, changes: Subscription, events: Subscription
 ) -> _Answer:
-    _wait_for_monitor(bus)
+    _wait_for_monitor(bus, command)
     sent = signed(bus, command)
     bus.publish(COMMANDS, sent)
     answer = _Answer()
@@ -70,13 +83,22 @@ def _answer_to(
     return answer
 
 
-def _wait_for_monitor(bus: Bus) -> None:
+def _wait_for_monitor(bus: Bus, command: AlarmCommand) -> None:
     deadline = time.monotonic() + TIMEOUT
+    # The witness, which has an alarm of its own, answers for the list without a monitor too.
+    alone = command.name in (MONITOR_STALE, EVERY_ALARM)
     while True:
         try:
             ask_alarm_list(bus, TIMEOUT)
-            return
+            if alone or _monitors(bus):
+                return
+            raise no_monitor(bus)
         except BusError:
             if time.monotonic() > deadline:
                 raise
             time.sleep(SETTLE)
+
+
+def _monitors(bus: Bus) -> frozenset[tuple[str, str | None]]:
+    """The runs of the monitor that are there; one that has started anew is another."""
+    return frozenset(bus.names(f"{SAID_KEY}/monitor"))

@@ -26,9 +26,14 @@ def ask_alarm_list(bus: Bus, timeout: float = 1.0) -> list[Alarm]:
     """
     replies = bus.query(KEY, timeout=timeout)
     if _MARK not in replies:
-        raise BusError(f"no monitor of rig {bus.rig} answers: start `rigwatch monitor`")
+        raise no_monitor(bus)
     alarms = []
     for reply in replies:
         with contextlib.suppress(MessageError):
             alarms += [decode(Alarm, reply)] if reply != _MARK else []
     return sorted(alarms, key=lambda alarm: (not alarm.first_out, alarm.t_ns))
+
+
+def no_monitor(bus: Bus) -> BusError:
+    """The error that nobody is there who could execute a command."""
+    return BusError(f"no monitor of rig {bus.rig} answers: start `rigwatch monitor`")
