@@ -33,7 +33,7 @@ from monitor.signals import (
 from monitor.signals import conditions as kinds
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kernel import kernel
-from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
+from rigwatch.wire.messages import ColumnTable, EstimateBlock, SampleBlock
 
 PUBLISHED: tuple[tuple[str, str, int], ...] = (
     ("modelled_acceleration", "m/s^2", w.MODELLED),
@@ -57,7 +57,8 @@ PUBLISHED: tuple[tuple[str, str, int], ...] = (
     ("together", "", w.TOGETHER),
 )
 """Columns of an estimate block: name, unit, index in the kernel's output."""
-_NO_QUALITY = np.zeros(0, np.uint8)
+_NAMES = tuple((name, unit) for name, unit, _ in PUBLISHED)
+_ROWS = np.array([row for _, _, row in PUBLISHED])
 
 
 class Monitor:
@@ -165,9 +166,7 @@ class Monitor:
             boot=block.boot,
             seq=int(admitted.seq[admitted.padding]),
             t_ns=block.t_ns[len(block) - kept.shape[1] :],
-            columns=tuple(
-                [Column(name, unit, kept[k], _NO_QUALITY) for name, unit, k in PUBLISHED]
-            ),
+            columns=ColumnTable(_NAMES, kept[_ROWS]),
         )
         return Result(estimates, self._conditions(kept, run, admitted.missing))
 

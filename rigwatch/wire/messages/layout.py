@@ -51,6 +51,12 @@ class Layout:
         return tuple((place.name, place.unit, place.quality >= 0) for place in self.columns)
 
     @cached_property
+    def plain_names(self) -> tuple[tuple[str, str], ...]:
+        """Name and unit of each column; none if one has quality."""
+        judged = any(place.quality >= 0 for place in self.columns)
+        return () if judged else tuple((place.name, place.unit) for place in self.columns)
+
+    @cached_property
     def numbers(self) -> NDArray[np.intp]:
         """Offsets of all bytes of the times, then of the values, then of the quality."""
         eights = [*self.times, *(place.values for place in self.columns)]
