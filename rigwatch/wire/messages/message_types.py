@@ -92,6 +92,13 @@ class ColumnTable(Sequence[Column]):
         name, unit = self.names[place]
         return Column(name, unit, self.values[place], np.zeros(0, np.uint8))
 
+    def named(self, name: str) -> Column:
+        """The column called `name`; KeyError if there is none."""
+        for place, (known, _) in enumerate(self.names):
+            if known == name:
+                return self[place]
+        raise KeyError(name)
+
     def cut(self, part: slice) -> "ColumnTable":
         """The same columns over a part of the samples; a view."""
         return ColumnTable(self.names, self.values[:, part])
@@ -151,6 +158,8 @@ class EstimateBlock:
 
     def column(self, name: str) -> Column:
         """The field called `name`; KeyError if there is none."""
+        if isinstance(self.columns, ColumnTable):
+            return self.columns.named(name)
         for column in self.columns:
             if column.name == name:
                 return column

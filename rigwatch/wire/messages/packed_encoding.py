@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 
 from rigwatch.wire.messages import protobuf_schema as schema
 from rigwatch.wire.messages.blocks import Block
-from rigwatch.wire.messages.message_types import Column, ColumnTable, EstimateBlock, SampleBlock
+from rigwatch.wire.messages.message_types import (
+    Column,
+    ColumnTable,
+    EstimateBlock,
+    Names,
+    SampleBlock,
+)
 from rigwatch.wire.messages.protobuf import encode
 
 _TAGS = {kind: schema.field_tags(kind) for kind in (Column, SampleBlock, EstimateBlock)}
@@ -22,6 +28,8 @@ _LARGEST = 1 << 63
 LENGTHS_KEPT = 512
 """Columns and lengths whose heads are kept: a live block has few lengths, a recorded one any, and
 ten times as many would take 2 MB before they serve again."""
+TABLES_KEPT = 64
+"""The same of whole tables."""
 
 
 def encode_block(block: Block) -> bytes:
@@ -61,9 +69,15 @@ def _rows(tag: bytes, table: ColumnTable) -> Iterator[bytes]:
     """The bytes of each column's head and of its values."""
     values = table.values.tobytes()
     size = table.values.itemsize * table.values.shape[1]
-    for place, (name, unit) in enumerate(table.names):
-        yield _around(tag, name, unit, size, 0)[0]
+    for place, head in enumerate(_heads(tag, table.names, size)):
+        yield head
         yield values[place * size : (place + 1) * size]
+
+
+@lru_cache(maxsize=TABLES_KEPT)
+def _heads(tag: bytes, names: Names, size: int) -> tuple[bytes, ...]:
+    """The bytes before the values of each column."""
+    return tuple(_around(tag, name, unit, size, 0)[0] for name, unit in names)
 
 
 def _column(tag: bytes, column: Column) -> bytes:
