@@ -107,9 +107,17 @@ class Seat:
         return self._process is None or bool(self._process.waits())
 
     def has_work(self, now: float) -> bool:
-        """Whether something has come, is to be judged, or is due at monotonic time `now` [s]."""
+        """Whether something has come, is to be judged, or is due at monotonic time `now` [s];
+        a failure as in `read`.
+        """
         process = self._process
-        return process is None or bool(self._due) or now >= self._look_at or len(process.reader) > 0
+        if process is None or self._due or now >= self._look_at:
+            return True
+        try:
+            return len(process.reader) > 0
+        except Exception as error:  # as in `_alone`
+            self._fail(error)
+            return False
 
     def read(self) -> None:
         """Take what has come; a failure ends this rig's run and no other's."""
