@@ -7,6 +7,7 @@ process of several is measured by `many_rigs`.
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -14,7 +15,7 @@ import msgspec
 
 from benchmarks.archives.recordings import MODEL, RATE, ROOT, SCENARIO, make_recordings
 from monitor.model import load_model
-from monitor.pipeline import RigMonitor, compile_kernels
+from monitor.pipeline import RigMonitor, compile_kernels, judge_together, ready_of
 from monitor.process.loop import MonitorProcess
 from rigwatch.archive import Store, ask, index
 from rigwatch.commands.sessions.replay import judged
@@ -28,6 +29,8 @@ WARM_UP = 200
 """Samples that are not counted."""
 BLOCKS = (1, 6, 24)
 """Samples that a monitor finds at once: as they come, in a turn of 25 ms, and of 100 ms."""
+RIGS, BLOCK = 16, 9
+"""Rigs that are judged together, and samples that one has in a turn."""
 SECONDS = 60
 """Length of a recording [s]."""
 
@@ -38,7 +41,7 @@ def run(quick: bool) -> list[Row]:
     with TemporaryDirectory(prefix="rigwatch-scale-") as name:
         folder = Path(name)
         rows = [_judging(folder, size, samples) for size in BLOCKS]
-        return [*rows, _bus(), *_recordings(folder, 10 if quick else 100)]
+        return [*rows, _together(samples), _bus(), *_recordings(folder, 10 if quick else 100)]
 
 
 def _row(what: str, measured: str, note: str = "") -> Row:
@@ -58,6 +61,43 @@ def _judging(folder: Path, size: int, samples: int) -> Row:
         f"a sample in the monitor, {size} at a time",
         f"{each * 1e6:.0f} µs, {100 * RATE * each:.2f} % of a core at {RATE} Hz",
         "decoding, judging, alarms, supervision of the link, encoding; without the bus",
+    )
+
+
+def _together(samples: int) -> Row:
+    """Blocks of nine samples judged by one call for several rigs, and by one for each."""
+    model = load_model(MODEL)
+    rigs = [RigMonitor(model) for _ in range(RIGS)]
+    blocks = [
+        one
+        for whole in simulate(SCENARIO, seconds=samples / RATE, block=28 * BLOCK)
+        for one in pieces(whole, BLOCK)
+    ]
+
+    def alone(some: list[SampleBlock]) -> None:
+        for block in some:
+            for rig in rigs:
+                rig.update(block)
+
+    def together(some: list[SampleBlock]) -> None:
+        for block in some:
+            ready = [ready_of(rig, block) for rig in rigs]
+            found = judge_together([one for one in ready if one is not None])
+            assert len(found) == RIGS
+            for rig, finish in zip(rigs, found, strict=True):
+                assert finish is not None
+                rig.announce(*finish())
+
+    third = len(blocks) // 3
+    alone(blocks[:third])
+    each = [
+        1e6 * _processor_time(partial(call, some)) / len(some) / RIGS
+        for call, some in ((alone, blocks[third : 2 * third]), (together, blocks[2 * third :]))
+    ]
+    return _row(
+        f"a block of {BLOCK} samples judged, alone and with those of {RIGS} rigs",
+        f"{each[0]:.0f} and {each[1]:.0f} µs",
+        "admission to alarms, without decoding and encoding",
     )
 
 

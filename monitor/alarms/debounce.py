@@ -46,6 +46,11 @@ class Debouncer:
         self._run = 0
         self._onset_seq = -1
 
+    @property
+    def is_idle(self) -> bool:
+        """Whether samples without the condition change nothing."""
+        return not self.level and self._run == 0
+
     def interrupt(self, *, bridged: bool = False) -> None:
         """Discard a run in progress: the next sample does not follow the last one.
 
@@ -58,7 +63,7 @@ class Debouncer:
     def update(self, active: NDArray[np.uint8], first_seq: int) -> list[Edge]:
         """Edges within a block whose first sample is `first_seq`; `active` has shape (n,)."""
         n = len(active)
-        if not self.level and self._run == 0 and is_zero(active):
+        if self.is_idle and is_zero(active):
             return []
         edges: list[Edge] = []
         cuts = np.flatnonzero(np.diff(active)) + 1

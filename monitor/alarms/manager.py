@@ -70,6 +70,7 @@ class AlarmManager:
         self._alarms: dict[str, AlarmInstance] = {}
         self._inherited: set[str] = set()
         self._debouncers: dict[str, Debouncer] = {}
+        self._at_rest = False
         self._flood = FloodWatch()
         self._first_out = ""
         self._next: tuple[int, int] | None = None
@@ -185,6 +186,7 @@ class AlarmManager:
         return [*(alarm for alarm in over if alarm.state == "normal"), *self.standing()]
 
     def _restore_one(self, record: AlarmRecord) -> None:
+        self._at_rest = False
         alarm = self._alarm(record.alarm.name)
         restore_from(alarm, record)
         self._debouncer(alarm.name).level = alarm.active
@@ -213,6 +215,14 @@ class AlarmManager:
         """Whether alarms have been restored whose conditions have not been determined since."""
         return bool(self._inherited)
 
+    @property
+    def is_idle(self) -> bool:
+        """Whether samples at which no condition holds change nothing: then none need be given."""
+        if not self._at_rest:
+            idle = all(one.is_idle for one in self._debouncers.values())
+            self._at_rest = idle and not self._inherited
+        return self._at_rest
+
     def _follow(self, boot: int, seq: int, count: int) -> None:
         """Interrupt the debouncers where the samples do not follow the last ones."""
         before, self._next = self._next, (boot, seq + count)
@@ -228,7 +238,7 @@ class AlarmManager:
     ) -> Iterable[tuple[int, tuple[tuple[int, str], str], bool, Occasion]]:
         """Edges of all conditions as sortable rows: place, order and name, direction, occasion."""
         for condition in conditions:
-            name = condition.name
+            name, self._at_rest = condition.name, False
             for edge in self._debouncer(name).update(condition.active, seq):
                 i = edge.index
                 at = Occasion(

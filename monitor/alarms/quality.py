@@ -77,6 +77,10 @@ class SensorFlags:
                 conditions.append(Condition(name, active, channel.values, no_limit, no_limit))
         return conditions
 
+    def is_clean(self, boot: int) -> bool:
+        """Whether samples of a boot without a flag change nothing: no spike is remembered."""
+        return boot == self._boot and not any(self._spikes.values())
+
     def _burst(self, channel: str, seq: int, spikes: Flags) -> Flags:
         """Where the newest `SPIKES` spikes lie within a second."""
         newest = self._spikes.setdefault(channel, deque(maxlen=SPIKES))

@@ -1,11 +1,29 @@
 """Clipping of each channel as conditions: runs `flat_top.py` with the model's probabilities."""
 
+from typing import NamedTuple
+
 import numpy as np
 
-from monitor.clipping.flat_top import NEVER, judge_flat_tops, new_flat_tops, reset_flat_tops
+from monitor.clipping.flat_top import (
+    NEVER,
+    FlatTops,
+    judge_flat_tops,
+    new_flat_tops,
+    reset_flat_tops,
+)
 from monitor.decision import rules_for
 from monitor.model import RigModel
 from monitor.signals import SENSOR_CLIPPED, Admitted, Condition, level
+from rigwatch.wire.arrays import FloatArray
+
+
+class SteadyClipping(NamedTuple):
+    """The arguments of `judge_flat_tops` that stay, and how many channels may be judged."""
+
+    judged: int
+    chance: FloatArray
+    limit: float
+    state: FlatTops
 
 
 class Clipping:
@@ -38,7 +56,14 @@ class Clipping:
         judge_flat_tops(
             admitted.signals, admitted.good, self._chance, self._limit, self._state, score
         )
-        kept = score[admitted.padding :]
+        return self.conditions(score[admitted.padding :])
+
+    def steady(self) -> SteadyClipping:
+        """What a kernel needs to judge samples that follow the last ones."""
+        return SteadyClipping(len(self._names), self._chance, self._limit, self._state)
+
+    def conditions(self, kept: FloatArray) -> tuple[Condition, ...]:
+        """The conditions for a score, shape (n, c), from `judge_flat_tops`."""
         none, limit = level(len(kept), -np.inf), level(len(kept), float(self._limit))
         return tuple(
             Condition(

@@ -14,8 +14,10 @@ from monitor.clipping import Clipping
 from monitor.decision import kernel_state as w
 from monitor.decision import rules_for, watch_block
 from monitor.model import InertiaPlant, RigModel
+from monitor.pipeline.flags import INVALID, JUDGED, LEARNT, MISSING, flag, flagging_of, judged_by
 from monitor.pipeline.promoted import PromotedFriction, check_can_follow
 from monitor.pipeline.result import Result
+from monitor.pipeline.steady_kernel import SteadyState
 from monitor.reference import ReferenceRules, new_reference, usual
 from monitor.signals import (
     GOOD,
@@ -32,8 +34,9 @@ from monitor.signals import (
 )
 from monitor.signals import conditions as kinds
 from rigwatch.wire.arrays import BoolArray, FloatArray
+from rigwatch.wire.kept_state import KeptState
 from rigwatch.wire.kernel import kernel
-from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
+from rigwatch.wire.messages import ColumnTable, EstimateBlock, SampleBlock
 
 PUBLISHED: tuple[tuple[str, str, int], ...] = (
     ("modelled_acceleration", "m/s^2", w.MODELLED),
@@ -57,7 +60,9 @@ PUBLISHED: tuple[tuple[str, str, int], ...] = (
     ("together", "", w.TOGETHER),
 )
 """Columns of an estimate block: name, unit, index in the kernel's output."""
-_NO_QUALITY = np.zeros(0, np.uint8)
+_NAMES = tuple((name, unit) for name, unit, _ in PUBLISHED)
+PUBLISHED_ROWS = np.array([row for _, _, row in PUBLISHED])
+"""Rows of the kernel's output that are published."""
 
 
 class Monitor:
@@ -97,9 +102,10 @@ class Monitor:
         self._clipping = Clipping(model)
         self._promoted = PromotedFriction(model)
         self._arming = _arming_rules(model)
-        self._judged = _judged_by(model)
+        self._judged, self._flagging = judged_by(model), flagging_of(model)
         self._reference = new_reference(self._arming, _known(model))
         self._state = _new_state(model)
+        self._steady: KeptState | None = None
 
     def update(self, block: SampleBlock) -> Result | None:
         """Process the next block; None if it contains nothing new."""
@@ -114,10 +120,47 @@ class Monitor:
         while end < len(admitted.code):
             begin, end = end, _end_of_gap(admitted.code, end)
             self._judge(admitted, begin, end, out, reset)
-        result = self._result(block, admitted, out)
-        reset = reset[admitted.padding :]
-        resets = above(kinds.MONITOR_RESET, reset, reset.astype(np.float64), 0.0)
-        return Result(result.estimates, (*result.conditions, resets, *clipping))
+        kept = slice(admitted.padding, None)
+        estimates = self._estimates(block, out[:, kept])
+        run = admitted.invalid_run[kept]
+        own = self._all_conditions(out[:, kept], run, admitted.missing, reset[kept])
+        return Result(estimates, (*own, *clipping))
+
+    def follows(self, block: SampleBlock) -> bool:
+        """Whether a block continues the last one, and nothing is pending from before it."""
+        return self._missing == 0 and self._admission.continues(block)
+
+    def steady(self) -> KeptState | None:
+        """The state that `judge_steady` continues with blocks that follow; None if it cannot."""
+        if self._promoted.adds or not isinstance(self._residual, TransferResidual):
+            return None
+        if self._steady is None:
+            self._steady = KeptState(
+                SteadyState(
+                    self._admission.steady(),
+                    self._clipping.steady(),
+                    self._residual.filters,
+                    self.rules,
+                    self._arming,
+                    self._reference,
+                    self._state,
+                    self._flagging,
+                )
+            )
+        return self._steady
+
+    def passed(self, block: SampleBlock, published: FloatArray) -> EstimateBlock:
+        """The estimates of a block that `judge_steady` has judged, from `PUBLISHED_ROWS`."""
+        self._admission.passed(len(block))
+        columns = ColumnTable(_NAMES, published)
+        return EstimateBlock(block.device, block.boot, block.seq, block.t_ns, columns)
+
+    def steady_conditions(
+        self, out: FloatArray, reset: BoolArray, clipping: FloatArray
+    ) -> tuple[Condition, ...]:
+        """The conditions of such a block."""
+        own = self._all_conditions(out, np.zeros(out.shape[1], np.int64), 0, reset)
+        return (*own, *self._clipping.conditions(clipping))
 
     def _judge(
         self, admitted: Admitted, begin: int, end: int, out: FloatArray, reset: BoolArray
@@ -157,34 +200,30 @@ class Monitor:
             return NOTHING
         return usual(self._reference, int(seq[0]) - missing - 1, missing + 2)
 
-    def _result(self, block: SampleBlock, admitted: Admitted, out: FloatArray) -> Result:
-        kept = out[:, admitted.padding :]
-        run = admitted.invalid_run[admitted.padding :]
-        estimates = EstimateBlock(
-            device=block.device,
-            boot=block.boot,
-            seq=int(admitted.seq[admitted.padding]),
-            t_ns=block.t_ns[len(block) - kept.shape[1] :],
-            columns=tuple(
-                [Column(name, unit, kept[k], _NO_QUALITY) for name, unit, k in PUBLISHED]
-            ),
-        )
-        return Result(estimates, self._conditions(kept, run, admitted.missing))
+    def _estimates(self, block: SampleBlock, out: FloatArray) -> EstimateBlock:
+        skipped = len(block) - out.shape[1]
+        seq, t_ns = block.seq + skipped, block.t_ns[skipped:]
+        columns = ColumnTable(_NAMES, out[PUBLISHED_ROWS])
+        return EstimateBlock(block.device, block.boot, seq, t_ns, columns)
+
+    def _all_conditions(
+        self, out: FloatArray, run: NDArray[np.int64], missing: int, reset: BoolArray
+    ) -> tuple[Condition, ...]:
+        resets = above(kinds.MONITOR_RESET, reset, reset.astype(np.float64), 0.0)
+        return (*self._conditions(out, run, missing), resets)
 
     def _conditions(
         self, out: FloatArray, run: NDArray[np.int64], missing: int
     ) -> tuple[Condition, ...]:
-        rules, decision = self.rules, self.model.decision
         n = out.shape[1]
-        flags = np.zeros((len(_JUDGED), n), np.uint8)
-        rules_of = (rules.factor, decision.least_velocity, decision.worst_condition)
-        _flag(out, run, missing, decision.longest_hold, *rules_of, flags)
+        flags = np.zeros((len(JUDGED), n), np.uint8)
+        flag(out, run, missing, self._flagging, flags)
         lost = np.zeros(n)
         lost[0] = missing
         values = {
-            _LEARNT: out[w.LEARNT_HERE] / self.model.sample_rate,
-            _GAP: lost,
-            _INVALID: run.astype(np.float64),
+            LEARNT: out[w.LEARNT_HERE] / self.model.sample_rate,
+            MISSING: lost,
+            INVALID: run.astype(np.float64),
         }
         return tuple([
             Condition(
@@ -196,69 +235,6 @@ class Monitor:
             )
             for row, (name, k, low, high) in enumerate(self._judged)
         ])  # fmt: skip
-
-
-_JUDGED: tuple[tuple[str, int], ...] = (
-    (kinds.DEPARTURE, w.DEVIATION),
-    (kinds.DRY_FRICTION, w.THETA1),
-    (kinds.STICTION, w.REST),
-    (kinds.OTHER_FAULT, w.EXPLAINED),
-    (kinds.EXCITATION_CHANGED, w.MOVED_VOLTAGE),
-    (kinds.REFERENCE_LEARNT, -1),
-    (kinds.NOT_OBSERVABLE, w.SPEED_RMS),
-    (kinds.ILL_CONDITIONED, w.CONDITION),
-    (kinds.GAP, -1),
-    (kinds.SENSOR_INVALID, -1),
-)
-"""Conditions, each with the output that is judged; -1 if it is not one alone."""
-(
-    _DEPARTED, _RUBS, _STICKS, _OTHER, _EXCITED,
-    _LEARNT, _STANDS, _ILL, _GAP, _INVALID,
-) = range(len(_JUDGED))  # fmt: skip
-_HIGH = {_STICKS: 0.5, _OTHER: np.inf, _EXCITED: 0.1, _STANDS: np.inf}
-"""Upper limits that no rule of the model gives; 0 for the others."""
-
-
-@kernel()
-def _flag(  # noqa: PLR0917
-    out: FloatArray,
-    run: NDArray[np.int64],
-    missing: int,
-    longest_hold: int,
-    factor: float,
-    least_velocity: float,
-    worst_condition: float,
-    flags: NDArray[np.uint8],
-) -> None:
-    """Where each of the conditions `_JUDGED` holds, shape (conditions, n)."""
-    for i in range(out.shape[1]):
-        armed, verdict = out[w.ARMED_FLAG, i] > 0.0, out[w.VERDICT, i]
-        sticks = verdict == w.STICKING
-        flags[_DEPARTED, i] = armed and out[w.DEVIATION, i] > factor
-        flags[_RUBS, i] = armed and (sticks or verdict == w.FRICTION)
-        flags[_STICKS, i] = armed and sticks
-        flags[_OTHER, i] = armed and verdict == w.OTHER
-        flags[_EXCITED, i] = armed and verdict == w.NEW_EXCITATION
-        flags[_LEARNT, i] = armed and out[w.LEARNT_HERE, i] > 0.0
-        flags[_STANDS, i] = armed and not out[w.SPEED_RMS, i] >= least_velocity
-        flags[_ILL, i] = armed and out[w.CONDITION, i] > worst_condition
-        flags[_GAP, i] = i == 0 and missing != 0
-        flags[_INVALID, i] = run[i] > longest_hold
-
-
-def _judged_by(model: RigModel) -> tuple[tuple[str, int, float, float], ...]:
-    """The conditions `_JUDGED`, each with its lower and upper limit."""
-    decision = model.decision
-    low = {_STANDS: decision.least_velocity}
-    high = _HIGH | {
-        _DEPARTED: rules_for(model).factor,
-        _ILL: decision.worst_condition,
-        _INVALID: decision.longest_hold,
-    }
-    return tuple(
-        (name, k, float(low.get(row, -np.inf)), float(high.get(row, 0.0)))
-        for row, (name, k) in enumerate(_JUDGED)
-    )
 
 
 @kernel()

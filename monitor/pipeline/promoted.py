@@ -29,19 +29,22 @@ class PromotedFriction:
 
     Args:
         model: the current model; without promoted friction nothing is added.
+
+    Attributes:
+        adds: whether anything is added.
     """
 
     def __init__(self, model: RigModel) -> None:
         self._promoted = known = model.promoted or PromotedSection()
         directed = known.coulomb_by_direction or known.viscous_by_direction
-        self._adds = bool(known.coulomb or known.viscous or directed)
+        self.adds = bool(known.coulomb or known.viscous or directed)
         self._b, self._a = model.friction.function().padded()
         self._state = np.zeros(max(self._b.size - 1, 1))
 
     def add(self, data: FloatArray, code: Codes) -> None:
         """Add promoted friction to the residual stage's columns, shape (n, 7), in place."""
         known = self._promoted
-        if not self._adds:
+        if not self.adds:
             return
         if known.smooth > 0.0:
             g1 = np.zeros(len(data))

@@ -19,15 +19,20 @@ from monitor.alarms import AlarmManager, Announcement, SensorFlags, settings_of
 from monitor.detectors import Detector
 from monitor.model import EquationsPlant, RigModel
 from monitor.pipeline.pipeline import Monitor
+from monitor.pipeline.result import Result
+from monitor.pipeline.steady_kernel import Outputs
 from monitor.signals import GAP, SENSOR_CLIPPED, SENSOR_INVALID, Condition, above
 from monitor.wiring import WIRING, WiringCheck
-from rigwatch.wire.arrays import BoolArray
+from rigwatch.wire.arrays import BoolArray, FloatArray
+from rigwatch.wire.kept_state import KeptState
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock, cut
 from rigwatch.wire.rig_config import AlarmSection
 
 if TYPE_CHECKING:
     from monitor.pipeline.observer_pipeline import ObserverMonitor
 
+Judged = tuple[EstimateBlock, tuple[Condition, ...]]
+"""Estimates of a block, and its conditions."""
 OF_SAMPLES = frozenset({GAP, SENSOR_CLIPPED, SENSOR_INVALID})
 """Conditions of the samples themselves, independent of the friction scheme."""
 
@@ -80,16 +85,56 @@ class RigMonitor:
         judged = self.judge(block)
         return None if judged is None else Watched(*judged, self.announce(*judged))
 
-    def judge(self, block: SampleBlock) -> tuple[EstimateBlock, tuple[Condition, ...]] | None:
+    def judge(self, block: SampleBlock) -> Judged | None:
         """Compute estimates and conditions of the next block, to be published before its alarms.
 
         Raises:
             KeyError: the block lacks a channel of the model.
         """
         result = self._pipeline.update(block)
-        if result is None:
-            return None
-        at, fresh = result.estimates, _fresh(block, result.estimates)
+        return None if result is None else self._completed(result, _fresh(block, result.estimates))
+
+    def follows(self, block: SampleBlock) -> bool:
+        """Whether a block can be judged together with others (`together.py`): it continues the
+        last one, and no detector or check needs its samples.
+        """
+        return (
+            isinstance(self._pipeline, Monitor)
+            and not self._detectors
+            and self._pipeline.follows(block)
+            and self._sensors.is_clean(block.boot)
+            and (self._wiring is None or self._wiring.has_passed(block))
+        )
+
+    def steady(self) -> KeptState | None:
+        """The state that `judge_steady` continues with blocks that follow; None if it cannot."""
+        return self._pipeline.steady() if isinstance(self._pipeline, Monitor) else None
+
+    def completed(
+        self, block: SampleBlock, published: FloatArray, out: Outputs, place: int
+    ) -> Judged:
+        """The results of a block that `judge_steady` has judged.
+
+        No conditions if none holds and no alarm waits for one.
+
+        Args:
+            block: continues the last one.
+            published: its `PUBLISHED_ROWS`, shape (columns, n).
+            out: what the kernel has filled.
+            place: of the rig in `out`.
+        """
+        assert isinstance(self._pipeline, Monitor)
+        at = self._pipeline.passed(block, published)
+        if not out.holds[place] and self.alarms.is_idle:
+            if self._wiring is not None:
+                self._wiring.update(block)
+            return at, ()
+        outputs = out.columns[place], out.reset[place], out.clipping[place]
+        return self._completed(Result(at, self._pipeline.steady_conditions(*outputs)), block)
+
+    def _completed(self, result: Result, fresh: SampleBlock) -> Judged:
+        """Add what detectors, wiring check and sensors find in the new samples of a block."""
+        at = result.estimates
         found = [detector.update(fresh) for detector in self._detectors]
         if found:
             added = [column for columns, _ in found for column in columns]

@@ -15,7 +15,7 @@ from monitor.alarms import AlarmJournal, Announcement, Occasion, just_returned
 from monitor.detectors import FRICTION, detectors_of
 from monitor.diagnosis import Explainer
 from monitor.model import RigModel, load_model
-from monitor.pipeline import RigMonitor, compile_kernels
+from monitor.pipeline import Judged, Ready, RigMonitor, compile_kernels, ready_of
 from monitor.process.cursor import Cursor
 from monitor.process.health import HealthBook
 from monitor.process.key_watch import KeyWatch
@@ -27,7 +27,7 @@ from monitor.process.rig_time import RigTime
 from monitor.process.startup_grace import Patience
 from monitor.signals import MONITOR_RESET
 from rigwatch.wire.bus import Bus, CommandCheck, joined, serve_alarm_list
-from rigwatch.wire.delivery import POSITION_WRONG, SampleReader
+from rigwatch.wire.delivery import POSITION_WRONG, Item, SampleReader
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.host import (
     MONITOR,
@@ -237,9 +237,7 @@ class MonitorProcess:
             self.bus.publish(EVENTS, Event("monitor", at, "info", "MODEL", text))
 
     def _judge(self, block: SampleBlock) -> None:
-        self._judged_ns = int(block.t_ns[-1])
-        self._now_ns(self._judged_ns)
-        self._delivered_s += len(block) / self.rig.model.sample_rate
+        self._count(block)
         known = self._known_of(block)
         try:
             if known:
@@ -254,10 +252,31 @@ class MonitorProcess:
             if not len(fresh):
                 self._estimated_s = self._delivered_s
             return
+        self._tell(fresh, judged)
+
+    def ready(self, item: Item) -> Ready | None:
+        """An item, if it is a block that can be judged together with those of other rigs."""
+        if not isinstance(item, SampleBlock) or self._known_of(item):
+            return None
+        return ready_of(self.rig, item)
+
+    def take_judged(self, block: SampleBlock, judged: Judged) -> None:
+        """Process a block that has been judged together with those of other rigs."""
+        self._count(block)
+        self._unsuitable = ""
+        self._tell(block, judged)
+
+    def _count(self, block: SampleBlock) -> None:
+        self._judged_ns = int(block.t_ns[-1])
+        self._now_ns(self._judged_ns)
+        self._delivered_s += len(block) / self.rig.model.sample_rate
+
+    def _tell(self, fresh: SampleBlock, judged: Judged) -> None:
+        """Publish the results of new samples."""
         self._estimated_s = self._delivered_s
         self.bus.publish(ESTIMATES, judged[0])
         self._explainer.take(judged[0], fresh)
-        self._health.judged(int(block.t_ns[-1]), time.time_ns())
+        self._health.judged(self._judged_ns, time.time_ns())
         self.say(self.rig.announce(*judged))
 
     def _known_of(self, block: SampleBlock) -> int:

@@ -22,6 +22,7 @@ from functools import partial
 from pathlib import Path
 
 from monitor.model import RigModel
+from monitor.pipeline import Finish, Ready, compile_together, judge_together
 from monitor.process.loop import (
     LONGEST_BLOCK,
     MonitorProcess,
@@ -45,6 +46,8 @@ TURN = 0.005
 """Time from one turn to the next: samples wait for half of it on average [s]."""
 LOOK_EVERY = 0.1
 """Time from one look at a rig's commands, link and silence to the next [s]."""
+FEWEST_TOGETHER = 2
+"""Rigs of which a block has come, from which on they are judged together."""
 MOST_BLOCKS = 4
 """Blocks of one rig in a turn while it catches up, so that the others go on."""
 FIRST_PAUSE, LONGEST_PAUSE = 1.0, 30.0
@@ -79,6 +82,7 @@ class Seat:
         self._path, self._say, self._join = path, say, join
         self._process: MonitorProcess | None = None
         self._due: deque[Item] = deque()
+        self._ready: Ready | None = None
         self._joined: queue.SimpleQueue[Joined] = queue.SimpleQueue()
         self._pause, self._again_at = FIRST_PAUSE, float("inf")
         self._before = 0
@@ -102,6 +106,19 @@ class Seat:
         """Whether there are no samples to come: no bus yet, no daq, or no device."""
         return self._process is None or bool(self._process.waits())
 
+    def has_work(self, now: float) -> bool:
+        """Whether something has come, is to be judged, or is due at monotonic time `now` [s];
+        a failure as in `read`.
+        """
+        process = self._process
+        if process is None or self._due or now >= self._look_at:
+            return True
+        try:
+            return len(process.reader) > 0
+        except Exception as error:  # as in `_alone`
+            self._fail(error)
+            return False
+
     def read(self) -> None:
         """Take what has come; a failure ends this rig's run and no other's."""
         if self._process is None:
@@ -121,7 +138,7 @@ class Seat:
             self._fail(error)
 
     def _read(self, process: MonitorProcess) -> None:
-        if not self._due and (len(process.reader) or time.monotonic() >= self._look_at):
+        if not self._due:
             self._due.extend(_divided(process.reader.read(0.0)))
 
     def _judge(self, process: MonitorProcess) -> None:
@@ -134,6 +151,25 @@ class Seat:
         if self._settled and now >= self._look_at:
             process.look_around()
             self._look_at, self._pause = now + LOOK_EVERY, FIRST_PAUSE
+
+    def ready(self) -> Ready | None:
+        """The next block, if it can be judged together with those of other rigs."""
+        self._ready = None
+        if self._process is not None and self._due:
+            self._alone(self._look, self._process)
+        return self._ready
+
+    def _look(self, process: MonitorProcess) -> None:
+        self._ready = process.ready(self._due[0])
+
+    def finish(self, judged: Finish) -> None:
+        """Publish the results of the block that was ready; a failure as in `read`."""
+        process, ready = self._process, self._ready
+        if process is None or ready is None:
+            return
+        self._due.popleft()
+        self._settled = not self._due
+        self._alone(lambda process: process.take_judged(ready.block, judged()), process)
 
     def keep_position(self) -> None:
         """Store the position once the turn's estimates have been sent: a kill loses none."""
@@ -204,13 +240,26 @@ def one_turn(seats: Iterable[Seat], together: Callable[[], AbstractContextManage
 
     All are read before any is judged: a block of one that is judged late is as old as the others'.
     """
+    now = time.monotonic()
+    busy = [seat for seat in seats if seat.has_work(now)]
     with together():
-        for seat in seats:
+        for seat in busy:
             seat.read()
-        for seat in seats:
+        _judge_first(busy)
+        for seat in busy:
             seat.judge()
-    for seat in seats:
+    for seat in busy:
         seat.keep_position()
+
+
+def _judge_first(seats: Iterable[Seat]) -> None:
+    """Judge the first blocks of all rigs together where they simply follow the last ones."""
+    found = [(seat, ready) for seat in seats if (ready := seat.ready()) is not None]
+    if len(found) >= FEWEST_TOGETHER:
+        finishes = judge_together([ready for _, ready in found])
+        for (seat, _), finish in zip(found, finishes, strict=True):
+            if finish is not None:
+                seat.finish(finish)
 
 
 def take_turns(
@@ -227,11 +276,14 @@ def take_turns(
         heartbeat: of the process.
         together: entered for each turn, so that what it sends leaves together.
     """
+    tell_at = 0.0
     while not stop.is_set():
         began = time.monotonic()
         one_turn(seats, together)
-        waits = "no rig has samples to come" if all(seat.waits for seat in seats) else ""
-        heartbeat.advance(sum(seat.delivered for seat in seats), waits)
+        if began >= tell_at:
+            tell_at = began + LOOK_EVERY
+            waits = "no rig has samples to come" if all(seat.waits for seat in seats) else ""
+            heartbeat.advance(sum(seat.delivered for seat in seats), waits)
         stop.wait(max(0.0, began + TURN - time.monotonic()))
 
 
@@ -263,7 +315,7 @@ def run_several(paths: list[Path]) -> int:
 def _prepare(path: Path, config: RigConfig) -> None:
     """Compile what the rig needs before any is watched; its seat says what is wrong with it."""
     with contextlib.suppress(RigwatchError):
-        prepared(config, path)
+        compile_together(prepared(config, path))
 
 
 def _journals(loaded: list[tuple[Path, RigConfig]]) -> Iterable[tuple[Path, str]]:

@@ -11,6 +11,8 @@ from monitor.signals.admission import (
     Admission,
     Admitted,
     Codes,
+    SteadyAdmission,
+    admit_steady,
     usable,
 )
 from monitor.signals.conditions import (
@@ -40,7 +42,9 @@ from monitor.signals.residual import (
     POSITION,
     VELOCITY,
     VOLTAGE,
+    Filters,
     TransferResidual,
+    advance_filters,
     modelled_acceleration,
 )
 
@@ -73,11 +77,15 @@ __all__ = [
     "Admitted",
     "Codes",
     "Condition",
+    "Filters",
     "InertiaResidual",
     "Recording",
     "Role",
+    "SteadyAdmission",
     "TransferResidual",
     "above",
+    "admit_steady",
+    "advance_filters",
     "below",
     "commission_inertia",
     "conditions",

@@ -8,6 +8,7 @@ that has paused, or whose clock has jumped: its clock does, and restarts the fil
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,6 +70,17 @@ class Admitted:
     bridged: NDArray[np.bool_]
 
 
+class SteadyAdmission(NamedTuple):
+    """What a kernel needs to admit a block that follows the last one and has only good readings."""
+
+    needed: NDArray[np.bool_]
+    last: FloatArray
+    run: Codes
+    clock: Codes
+    longest_hold: int
+    period_us: float
+
+
 class Admission:
     """Keeps the last good sample and the count of bad ones from block to block.
 
@@ -127,6 +139,20 @@ class Admission:
         bridged = ~good | made
         return Admitted(values, code, valid_position, seq, padding, missing, run, good, bridged)
 
+    def steady(self) -> SteadyAdmission:
+        """The state that `admit_steady` continues; `passed` is told of each block it admits."""
+        return SteadyAdmission(
+            self._needed, self._last, self._run, self._clock, self._hold, self._period_us
+        )
+
+    def continues(self, block: SampleBlock) -> bool:
+        """Whether a block follows the last one of a boot that has had a good sample."""
+        return block.boot == self._boot and block.seq == self._next and not self._fresh
+
+    def passed(self, samples: int) -> None:
+        """So many samples have been admitted by `admit_steady`."""
+        self._next += samples
+
     def begin_again(self) -> None:
         """Restart every filter with the next good sample."""
         self._run[0] = self._hold + 1
@@ -166,6 +192,44 @@ def _find_good(values: FloatArray, flags: ByteArray, padding: int, good: NDArray
             good[k, c] = k >= padding and bad == 0 and abs(values[k, c]) <= LARGEST
             if not good[k, c]:
                 values[k, c] = 0.0
+
+
+@kernel()
+def admit_steady(  # noqa: PLR0917
+    state: SteadyAdmission,
+    values: FloatArray,
+    places: Codes,
+    device_us: Codes,
+    signals: FloatArray,
+    good: NDArray[np.bool_],
+    code: Codes,
+    run: Codes,
+) -> bool:
+    """Admit a block that follows the last one, if all its readings are good and its clock is even.
+
+    Otherwise the state is as before, and `Admission.admit` takes the block.
+
+    Args:
+        state: from `Admission.steady`.
+        values: a row for each of the block's channels, without flags, shape (any, n).
+        places: rows of the model's channels, shape (c,).
+        device_us: shape (n,).
+        signals, good, code, run: filled as in `Admitted`.
+    """
+    for k in range(code.size):
+        for c in range(places.size):
+            signals[k, c] = values[places[c], k]
+    _find_good(signals, np.zeros(signals.shape, np.uint8), 0, good)
+    clock, last, running = state.clock.copy(), state.last.copy(), state.run.copy()
+    clock[0] = clock[1] = 0
+    broken = np.zeros(code.size, np.bool_)
+    _find_breaks(device_us, state.period_us, clock, broken)
+    hold = state.longest_hold
+    _classify(signals, good, state.needed, broken, last, running, hold, code, run)
+    if not good.all() or (code != GOOD).any():
+        return False
+    state.clock[:], state.last[:], state.run[:] = clock, last, running
+    return True
 
 
 @kernel()

@@ -47,7 +47,7 @@ class _States(NamedTuple):
     late: FloatArray
 
 
-class _Filters(NamedTuple):
+class Filters(NamedTuple):
     """Coefficients and states of the four filters, and what a gap needs: the states and the
     readings of the last good sample, and the number of missing ones since.
     """
@@ -87,7 +87,7 @@ class TransferResidual:
             model.velocity.corner, model.sample_rate, model.velocity.sensor_corner
         )
         functions = (acceleration, velocity, model.friction.function())
-        self._filters = _Filters(
+        self.filters = Filters(
             *acceleration.padded(),
             *velocity.padded(),
             *functions[2].padded(),
@@ -111,7 +111,7 @@ class TransferResidual:
         """
         out = np.zeros((code.size, len(COLUMNS)))
         self.reset = np.zeros(code.size, np.bool_)
-        _advance(signals, code, usual, self._filters, out, self.reset)
+        advance_filters(signals, code, usual, self.filters, out, self.reset)
         return out
 
 
@@ -127,7 +127,7 @@ def _states_of(functions: tuple[TransferFunction, ...], delay: int) -> _States:
 
 
 @kernel()
-def _clear(f: _Filters) -> None:
+def _clear(f: Filters) -> None:
     f.now.plant[:] = 0.0
     f.now.velocity[:] = 0.0
     f.now.sign[:] = 0.0
@@ -154,7 +154,7 @@ def _within_limits(row: FloatArray) -> bool:
 
 
 @kernel()
-def _filter(readings: FloatArray, missing: bool, f: _Filters, out: FloatArray) -> None:
+def _filter(readings: FloatArray, missing: bool, f: Filters, out: FloatArray) -> None:
     """One sample through all filters, to the stage's columns, shape (7,)."""
     state, late = f.now, f.now.late
     oldest = late.shape[0] - 1
@@ -174,7 +174,7 @@ def _filter(readings: FloatArray, missing: bool, f: _Filters, out: FloatArray) -
 
 
 @kernel()
-def _pass_gap(readings: FloatArray, usual: FloatArray, f: _Filters) -> None:
+def _pass_gap(readings: FloatArray, usual: FloatArray, f: Filters) -> None:
     """Pass the missing samples again, now that `readings` after them are known."""
     count, unused, between = f.missing[0], np.zeros(7), np.zeros(3)
     known = usual.shape[0] == count + 2
@@ -191,7 +191,7 @@ def _pass_gap(readings: FloatArray, usual: FloatArray, f: _Filters) -> None:
 
 
 @kernel()
-def _follow_gap(readings: FloatArray, held: bool, usual: FloatArray, f: _Filters) -> None:
+def _follow_gap(readings: FloatArray, held: bool, usual: FloatArray, f: Filters) -> None:
     """Keep what a gap needs, before its first sample and after its last one."""
     if held:
         if f.missing[0] == 0:
@@ -205,14 +205,15 @@ def _follow_gap(readings: FloatArray, held: bool, usual: FloatArray, f: _Filters
 
 
 @kernel()
-def _advance(  # noqa: PLR0917 -- a kernel
+def advance_filters(  # noqa: PLR0917 -- a kernel
     signals: FloatArray,
     code: Codes,
     usual: FloatArray,
-    f: _Filters,
+    f: Filters,
     out: FloatArray,
     reset: BoolArray,
 ) -> None:
+    """`TransferResidual.update`, which see."""
     oldest = f.now.late.shape[0] - 1
     for k in range(code.size):
         if f.was_reset[0] and code[k] == GOOD:

@@ -75,6 +75,10 @@ class WiringCheck:
             if self._failed == name
         )
 
+    def has_passed(self, block: SampleBlock) -> bool:
+        """Whether no sample of a block is in doubt, as the wiring has passed."""
+        return self._passed and block.boot == self._boot
+
     def _first_failed(self, block: SampleBlock, doubted: BoolArray) -> int:
         """The first sample at which the wiring counts as wrong; the block's length if none.
 

@@ -31,6 +31,14 @@ def kernel(**options: Any) -> Callable[[F], F]:
 class _KeyedByCode(FunctionCache):
     """numba's cache of one function, keyed by all code and constants compiled into it."""
 
+    def load_overload(self, sig: object, target_context: object) -> object:
+        """The compiled function; None, and an empty cache, if it names a class that is gone."""
+        try:
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except (AttributeError, ImportError):  # written by another version
+            self.flush()  # type: ignore[no-untyped-call]
+            return None
+
     def _index_key(self, sig: object, codegen: object) -> tuple[object, ...]:
         by_signature = super()._index_key(sig, codegen)  # type: ignore[no-untyped-call]
         return (*by_signature, fingerprint(self._py_func))
@@ -52,6 +60,8 @@ def _parts(function: Any, seen: set[object]) -> Iterator[str]:
         for name, value in _globals(code, function.__globals__):
             if isinstance(value, Dispatcher):
                 yield from _parts(value.py_func, seen)
+            elif (written := getattr(value, "_defn", None)) is not None:  # an intrinsic
+                yield from _parts(written, seen)
             elif isinstance(value, np.ndarray):
                 yield f"{name} {value.tolist()}"
             elif isinstance(value, (bool, int, float, str, tuple)):

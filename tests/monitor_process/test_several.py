@@ -115,26 +115,42 @@ def test_each_rig_is_judged_as_if_alone_and_one_without_a_router_delays_none(ben
     bench.turn_until(range(1), 39)
 
 
-def test_a_rig_that_fails_starts_anew_and_goes_on_where_it_was(bench, monkeypatch):
+class Unreadable:
+    """A reader whose queue cannot be looked at."""
+
+    def __init__(self, reader: object) -> None:
+        self._reader = reader
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._reader, name)
+
+    def __len__(self) -> int:
+        raise OSError("the disk is gone")
+
+
+@pytest.mark.parametrize(("place", "first"), [("take", 40), ("take_judged", 400), ("reader", 40)])
+def test_a_rig_that_fails_starts_anew_and_goes_on_where_it_was(bench, monkeypatch, place, first):
     monkeypatch.setattr("monitor.process.several.FIRST_PAUSE", 0.01)
     bench.join_all(range(1, 3))
-    bench.send(1, 0, 40)
-    bench.send(2, 0, 40)
-    bench.turn_until(range(1, 3), 39)
+    for number in (1, 2):
+        bench.send(number, 0, first, size=8)
+    bench.turn_until(range(1, 3), first - 1)
     broken = bench.seats[1]
     broken._pause = 0.01
 
-    def fail(_: object) -> None:
+    def fail(*_: object) -> None:
         raise OSError("the disk is gone")
 
-    monkeypatch.setattr(broken._process, "take", fail)
-    bench.send(1, 40, 40)
-    bench.send(2, 40, 40)
-    bench.turn_until(range(1, 3), 79)
+    reader = Unreadable(broken._process.reader)
+    monkeypatch.setattr(broken._process, place, reader if place == "reader" else fail)
+    # By 400 samples the wiring has passed, and both are judged together.
+    bench.send(1, first, 40)
+    bench.send(2, first, 40)
+    bench.turn_until(range(1, 3), first + 39)
     (said,) = bench.said
     assert said.endswith("the disk is gone; starts anew in 0 s")
-    assert sorted(_values(bench.judged[1])) == list(range(80))
-    assert sum(seat.delivered for seat in bench.seats) >= 160
+    assert sorted(_values(bench.judged[1])) == list(range(first + 40))
+    assert sum(seat.delivered for seat in bench.seats) >= 2 * (first + 40)
 
 
 def test_all_rigs_are_read_before_any_is_judged(bench, monkeypatch):

@@ -63,3 +63,32 @@ def test_what_another_file_holds_is_part_of_the_key(tmp_path: Path) -> None:
         assert run(tmp_path) == ["12.0", "0"], after
     called.write_text(CALLED)
     assert run(tmp_path) == ["8.0", "1"]
+
+
+HOLDER = """
+from typing import NamedTuple
+import numpy as np
+
+class Before(NamedTuple):
+    held: np.ndarray
+"""
+USER = """
+import numpy as np
+from called import Before
+from rigwatch.wire.kernel import kernel
+
+@kernel()
+def result(state):
+    return state.held[0]
+
+print(result(Before(np.ones(1))), sum(result.stats.cache_hits.values()))
+"""
+
+
+def test_a_cache_that_names_a_class_that_is_gone_is_written_anew(tmp_path: Path) -> None:
+    for name, hits in (("Before", "0"), ("After", "0"), ("After", "1")):
+        (tmp_path / "called.py").write_text(HOLDER.replace("Before", name))
+        caller = tmp_path / "caller.py"
+        if not caller.exists() or name not in caller.read_text():
+            caller.write_text(USER.replace("Before", name))
+        assert run(tmp_path) == ["1.0", hits]

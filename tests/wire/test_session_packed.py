@@ -11,7 +11,7 @@ from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import columns_of, concatenate, continues, decode_all, packed, pieces
 from rigwatch.wire.messages import decode as quick_decode
 from rigwatch.wire.messages import encode as quick_encode
-from rigwatch.wire.messages.message_types import Column, EstimateBlock, SampleBlock
+from rigwatch.wire.messages.message_types import Column, ColumnTable, EstimateBlock, SampleBlock
 from rigwatch.wire.messages.packed import decode_block
 from rigwatch.wire.messages.packed_encoding import LENGTHS_KEPT, _around
 from rigwatch.wire.messages.protobuf import decode, encode
@@ -37,8 +37,15 @@ def blocks(draw: st.DrawFn) -> Block:
     t_ns = rng.integers(-(2**62), 2**62, n)
     device, boot, seq = draw(NAMES), draw(INTEGERS), draw(INTEGERS)
     if draw(st.booleans()):
-        return EstimateBlock(device, boot, seq, t_ns, columns)
+        table = _table(columns) if columns and draw(st.booleans()) else columns
+        return EstimateBlock(device, boot, seq, t_ns, table)
     return SampleBlock(device, boot, seq, t_ns[::-1].copy(), t_ns, columns)
+
+
+def _table(columns: tuple[Column, ...]) -> ColumnTable:
+    """The same columns without their quality, as rows of one array."""
+    names = tuple((column.name, column.unit) for column in columns)
+    return ColumnTable(names, np.array([column.values for column in columns]))
 
 
 def said(kind: type[Block], data: bytes, fast: bool) -> bytes | str:

@@ -4,7 +4,7 @@
 `flush`. Live, the process calls `flush` a few times a second; for a recording, at intervals.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -116,7 +116,7 @@ class Dashboard:
         self.facts.see_estimates(block)
 
     def _plot(
-        self, plots: list[quantities.Plot], t_ns: IntArray, columns: tuple[Column, ...]
+        self, plots: list[quantities.Plot], t_ns: IntArray, columns: Sequence[Column]
     ) -> None:
         if len(t_ns):
             for plot in plots:

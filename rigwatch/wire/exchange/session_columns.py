@@ -6,7 +6,7 @@ Only tables of samples have `device_us`. `export` writes them; reading one resto
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -97,7 +97,7 @@ def _columns(table: Table) -> list[Column]:
     return found
 
 
-def _cut(columns: tuple[Column, ...], part: slice) -> tuple[Column, ...]:
+def _cut(columns: Sequence[Column], part: slice) -> tuple[Column, ...]:
     return tuple(
         Column(column.name, column.unit, column.values[part], column.quality[part])
         for column in columns

@@ -16,7 +16,7 @@ from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages.blocks import owned
 from rigwatch.wire.messages.layout import Layout
-from rigwatch.wire.messages.message_types import ByteArray, Column
+from rigwatch.wire.messages.message_types import ByteArray, Column, ColumnTable, EstimateBlock
 from rigwatch.wire.messages.packed import (
     LARGEST_GATHERED,
     NO_QUALITY,
@@ -94,6 +94,9 @@ def _follows(one: _Part, other: _Part) -> bool:
 def _block(kind: type[K], run: Sequence[_Part]) -> K:
     first = run[0]
     times, values, quality = _numbers(run[0]) if len(run) == 1 else _joined(run)
+    if kind is EstimateBlock and first.layout.plain_names:
+        table = ColumnTable(first.layout.plain_names, values)
+        return kind(first.device, first.boot, first.seq, times[0], table)  # type: ignore[call-arg, arg-type]
     rows, flags = iter(values), iter(quality)
     columns = tuple(
         [

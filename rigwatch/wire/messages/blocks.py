@@ -6,18 +6,18 @@ joined only if the second continues the first and has the same columns.
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigwatch.wire.messages.message_types import Column, EstimateBlock, SampleBlock
+from rigwatch.wire.messages.message_types import Column, ColumnTable, EstimateBlock, SampleBlock
 
 Block = SampleBlock | EstimateBlock
 B = TypeVar("B", SampleBlock, EstimateBlock)
 
 
-def columns_of(block: Block) -> tuple[Column, ...]:
+def columns_of(block: Block) -> Sequence[Column]:
     """The columns of a block of either kind."""
     return block.channels if isinstance(block, SampleBlock) else block.columns
 
@@ -34,6 +34,8 @@ def continues(first: Block, second: Block) -> bool:
 
 
 def _same_layout(first: Sequence[Column], second: Sequence[Column]) -> bool:
+    if isinstance(first, ColumnTable) and isinstance(second, ColumnTable):
+        return first.names == second.names
     return len(first) == len(second) and all(
         a.name == b.name and a.unit == b.unit and bool(len(a.quality)) == bool(len(b.quality))
         for a, b in zip(first, second, strict=True)
@@ -55,13 +57,19 @@ def concatenate(blocks: Sequence[B]) -> B:
 
 
 def _joined(blocks: Sequence[B]) -> B:
-    parts = zip(*(columns_of(block) for block in blocks), strict=True)
-    columns = tuple(_joined_column(part) for part in parts)
+    columns = _joined_columns([columns_of(block) for block in blocks])
     head, t_ns = blocks[0], np.concatenate([block.t_ns for block in blocks])
     if isinstance(head, SampleBlock):
         device_us = np.concatenate([block.device_us for block in blocks])
         return SampleBlock(head.device, head.boot, head.seq, device_us, t_ns, columns)
     return EstimateBlock(head.device, head.boot, head.seq, t_ns, columns)
+
+
+def _joined_columns(blocks: Sequence[Sequence[Column]]) -> Any:
+    tables = [columns for columns in blocks if isinstance(columns, ColumnTable)]
+    if len(tables) == len(blocks):
+        return ColumnTable(tables[0].names, np.hstack([table.values for table in tables]))
+    return tuple(_joined_column(part) for part in zip(*blocks, strict=True))
 
 
 def _joined_column(parts: Sequence[Column]) -> Column:
@@ -73,14 +81,19 @@ def _joined_column(parts: Sequence[Column]) -> Column:
 def cut(block: B, first: int, last: int) -> B:
     """Samples `first` to `last - 1` of the block, counted from 0; views, no copies."""
     part = slice(first, last)
-    columns = tuple(
-        Column(column.name, column.unit, column.values[part], column.quality[part])
-        for column in columns_of(block)
-    )
+    columns = _cut_columns(columns_of(block), part)
     seq, t_ns = block.seq + first, block.t_ns[part]
     if isinstance(block, SampleBlock):
         return SampleBlock(block.device, block.boot, seq, block.device_us[part], t_ns, columns)
     return EstimateBlock(block.device, block.boot, seq, t_ns, columns)
+
+
+def _cut_columns(columns: Sequence[Column], part: slice) -> Any:
+    if isinstance(columns, ColumnTable):
+        return columns.cut(part)
+    return tuple(
+        [Column(one.name, one.unit, one.values[part], one.quality[part]) for one in columns]
+    )
 
 
 def pieces(block: B, size: int) -> Iterator[B]:

@@ -1,13 +1,15 @@
 """Where the fields of a block of samples or estimates lie in its protobuf bytes."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 _EIGHT = 8
 """Size of a time or value [bytes]."""
+NUMBERS_KEPT = 512
+"""Numbers whose bytes are remembered: a boot comes with each of its blocks."""
 Span = tuple[int, int]
 
 
@@ -51,6 +53,12 @@ class Layout:
         return tuple((place.name, place.unit, place.quality >= 0) for place in self.columns)
 
     @cached_property
+    def plain_names(self) -> tuple[tuple[str, str], ...]:
+        """Name and unit of each column; none if one has quality."""
+        judged = any(place.quality >= 0 for place in self.columns)
+        return () if judged else tuple((place.name, place.unit) for place in self.columns)
+
+    @cached_property
     def numbers(self) -> NDArray[np.intp]:
         """Offsets of all bytes of the times, then of the values, then of the quality."""
         eights = [*self.times, *(place.values for place in self.columns)]
@@ -66,8 +74,8 @@ class Layout:
             ValueError: the device's name is no text.
         """
         device = "" if self.device is None else data[slice(*self.device)].decode()
-        boot, seq = (0 if at is None else integer(data, at) for at in (self.boot, self.seq))
-        return device, boot, seq
+        boot = 0 if self.boot is None else integer(data, self.boot)
+        return device, boot, 0 if self.seq is None else integer(data, self.seq)
 
 
 def varint(data: bytes, at: int) -> tuple[int, int]:
@@ -89,7 +97,23 @@ def varint(data: bytes, at: int) -> tuple[int, int]:
             return value, at
 
 
+@lru_cache(maxsize=NUMBERS_KEPT)
+def filling(encoded: bytes) -> int | None:
+    """The unsigned number that fills these bytes; None if it does not.
+
+    Raises:
+        UnfamiliarError: it is longer than 64 bits.
+    """
+    try:
+        value, end = varint(encoded, 0)
+    except IndexError:
+        return None
+    return value if end == len(encoded) else None
+
+
 def integer(data: bytes, span: Span) -> int:
     """A zigzag varint."""
-    value, _ = varint(data, span[0])
+    value = filling(data[span[0] : span[1]])
+    if value is None:
+        raise UnfamiliarError
     return (value >> 1) ^ -(value & 1)

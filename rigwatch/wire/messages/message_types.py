@@ -10,9 +10,9 @@ Samples and everything computed from them carry `(boot, seq)`: `boot` is drawn a
 each start, `seq` counts its samples from 0.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,54 @@ class Column:
         if len(self.quality):
             good &= valid(self.quality)
         return np.where(good, self.values, np.nan)
+
+
+Names = tuple[tuple[str, str], ...]
+"""Name and unit of each column."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ColumnTable(Sequence[Column]):
+    """Columns without quality flags, in order, whose numbers are the rows of one array.
+
+    A `Column` for each of twenty signals costs more than the numbers of a block of some samples, so
+    it is made when somebody asks for it.
+
+    Attributes:
+        names: of the rows.
+        values: shape (columns, n).
+    """
+
+    names: Names
+    values: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __iter__(self) -> Iterator[Column]:
+        for (name, unit), row in zip(self.names, self.values, strict=True):
+            yield Column(name, unit, row, np.zeros(0, np.uint8))
+
+    @overload
+    def __getitem__(self, place: int) -> Column: ...
+    @overload
+    def __getitem__(self, place: slice) -> tuple[Column, ...]: ...
+    def __getitem__(self, place: int | slice) -> Column | tuple[Column, ...]:
+        if isinstance(place, slice):
+            return tuple(self)[place]
+        name, unit = self.names[place]
+        return Column(name, unit, self.values[place], np.zeros(0, np.uint8))
+
+    def named(self, name: str) -> Column:
+        """The column called `name`; KeyError if there is none."""
+        for place, (known, _) in enumerate(self.names):
+            if known == name:
+                return self[place]
+        raise KeyError(name)
+
+    def cut(self, part: slice) -> "ColumnTable":
+        """The same columns over a part of the samples; a view."""
+        return ColumnTable(self.names, self.values[:, part])
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,13 +151,15 @@ class EstimateBlock:
     boot: int
     seq: int
     t_ns: IntArray
-    columns: tuple[Column, ...]
+    columns: Sequence[Column]
 
     def __len__(self) -> int:
         return len(self.t_ns)
 
     def column(self, name: str) -> Column:
         """The field called `name`; KeyError if there is none."""
+        if isinstance(self.columns, ColumnTable):
+            return self.columns.named(name)
         for column in self.columns:
             if column.name == name:
                 return column

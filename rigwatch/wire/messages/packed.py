@@ -13,7 +13,14 @@ from typing import Any, TypeVar
 import numpy as np
 
 from rigwatch.wire.messages import protobuf_schema as schema
-from rigwatch.wire.messages.layout import ColumnPlace, Layout, Span, UnfamiliarError, varint
+from rigwatch.wire.messages.layout import (
+    ColumnPlace,
+    Layout,
+    Span,
+    UnfamiliarError,
+    filling,
+    varint,
+)
 from rigwatch.wire.messages.message_types import ByteArray, Column, EstimateBlock, SampleBlock
 from rigwatch.wire.messages.protobuf import decode
 from rigwatch.wire.messages.recent import Recent
@@ -74,9 +81,12 @@ def layout_of(kind: type[Any], data: bytes) -> Layout:
 
 def _fits(layout: Layout, data: bytes) -> bool:
     for span in (layout.boot, layout.seq):
-        if span is not None and varint(data, span[0])[1] != span[1]:
+        if span is not None and filling(data[span[0] : span[1]]) is None:
             return False
-    return all(data[start:stop] == part for start, stop, part in layout.fixed)
+    for start, _, part in layout.fixed:  # noqa: SIM110 (a generator takes longer)
+        if not data.startswith(part, start):
+            return False
+    return True
 
 
 def _read(kind: type[K], layout: Layout, data: bytes) -> K:

@@ -4,6 +4,7 @@ The bytes are those of `protobuf.encode`, which makes a Python object of every n
 module does not recognise is left to it.
 """
 
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -11,7 +12,13 @@ from numpy.typing import NDArray
 
 from rigwatch.wire.messages import protobuf_schema as schema
 from rigwatch.wire.messages.blocks import Block
-from rigwatch.wire.messages.message_types import Column, EstimateBlock, SampleBlock
+from rigwatch.wire.messages.message_types import (
+    Column,
+    ColumnTable,
+    EstimateBlock,
+    Names,
+    SampleBlock,
+)
 from rigwatch.wire.messages.protobuf import encode
 
 _TAGS = {kind: schema.field_tags(kind) for kind in (Column, SampleBlock, EstimateBlock)}
@@ -21,6 +28,8 @@ _LARGEST = 1 << 63
 LENGTHS_KEPT = 512
 """Columns and lengths whose heads are kept: a live block has few lengths, a recorded one any, and
 ten times as many would take 2 MB before they serve again."""
+TABLES_KEPT = 64
+"""The same of whole tables."""
 
 
 def encode_block(block: Block) -> bytes:
@@ -37,16 +46,38 @@ def encode_block(block: Block) -> bytes:
         _number(seq, int(block.seq)),
         *(_part(tag, one.tobytes()) for tag, one in zip(places[: 1 + samples], times, strict=True)),
     ]
-    parts += [_column(places[-1], column) for column in columns]
+    if isinstance(columns, ColumnTable):
+        parts += _rows(places[-1], columns)
+    else:
+        parts += [_column(places[-1], column) for column in columns]
     return b"".join(parts)
 
 
-def _is_plain(block: Block, times: list[NDArray[np.int64]], columns: tuple[Column, ...]) -> bool:
+def _is_plain(block: Block, times: list[NDArray[np.int64]], columns: Sequence[Column]) -> bool:
+    if isinstance(columns, ColumnTable):
+        numbers = columns.values.dtype == _FLOAT
+    else:
+        numbers = all(c.values.dtype == _FLOAT and c.quality.dtype == _BYTE for c in columns)
     return (
-        all(-_LARGEST <= number < _LARGEST for number in (block.boot, block.seq))
+        numbers
+        and all(-_LARGEST <= number < _LARGEST for number in (block.boot, block.seq))
         and all(one.dtype == _INT for one in times)
-        and all(c.values.dtype == _FLOAT and c.quality.dtype == _BYTE for c in columns)
     )
+
+
+def _rows(tag: bytes, table: ColumnTable) -> Iterator[bytes]:
+    """The bytes of each column's head and of its values."""
+    values = table.values.tobytes()
+    size = table.values.itemsize * table.values.shape[1]
+    for place, head in enumerate(_heads(tag, table.names, size)):
+        yield head
+        yield values[place * size : (place + 1) * size]
+
+
+@lru_cache(maxsize=TABLES_KEPT)
+def _heads(tag: bytes, names: Names, size: int) -> tuple[bytes, ...]:
+    """The bytes before the values of each column."""
+    return tuple(_around(tag, name, unit, size, 0)[0] for name, unit in names)
 
 
 def _column(tag: bytes, column: Column) -> bytes:

@@ -4,7 +4,7 @@ The descriptors need no compiler, and MCAP files store `file_descriptor_set` so 
 decode a session.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from functools import cache
 from typing import Any, Literal, get_args, get_origin, get_type_hints
@@ -41,7 +41,7 @@ def is_map(annotation: Any) -> bool:
 
 def is_columns(annotation: Any) -> bool:
     """Whether a field holds columns."""
-    return get_origin(annotation) is tuple and get_args(annotation)[0] is Column
+    return get_origin(annotation) in {tuple, Sequence} and get_args(annotation)[0] is Column
 
 
 def _add_field(proto: descriptor_pb2.DescriptorProto, name: str, number: int, hint: Any) -> None:
