@@ -1,11 +1,13 @@
 """What is not claimed: one effect where much is left, anything of a model that nobody checked."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from rigwatch.workbench.data.noise.error_spectrum import ErrorSpectrum
 from rigwatch.workbench.data.noise.noise_floor import NoiseFloor
 from rigwatch.workbench.explain.adequacy import unchecked
 from rigwatch.workbench.explain.rough_verdict import (
@@ -52,6 +54,13 @@ def test_one_effect_that_leaves_much_of_a_rough_model_is_not_named_with_confiden
 def test_a_strong_effect_may_leave_more_as_it_changes_the_motion() -> None:
     assert limited_verdict(left(28.0), [], FLOOR, naming(3.3)).word == "missing_effect"
     assert limited_verdict(left(7.3), [], FLOOR, naming(2.0)).word == "undetermined"
+
+
+def test_a_share_above_the_floor_hides_nothing_where_the_error_is_known_by_frequency() -> None:
+    known = replace(FLOOR, own_error=ErrorSpectrum(np.ones((11, 1))))
+
+    assert leaves_some(left(4.0), FLOOR, naming(1.3))
+    assert not leaves_some(left(4.0), known, naming(1.3))
 
 
 @pytest.mark.parametrize("found", [naming(1.3), naming(2.0, ("cubic_stiffness@load",))])
