@@ -32,7 +32,7 @@ OUTPUTS = (
     VERDICT, SENSORS, SPREAD, DEPARTED, AMPLITUDE, DEVIATIONS,
 ) = range(len(OUTPUTS))  # fmt: skip
 
-USUAL_LASTING, USUAL_SHORT, USUAL_MEDIUM, USUAL_FRICTION, USUAL_RESPONSE = range(5)
+USUAL_LASTING, USUAL_SHORT, USUAL_MEDIUM, USUAL_FRICTION = range(4)
 """Rows of the healthy residual's extremes at the present motion, see `usual_error.Extremes`."""
 
 ERROR, DRY, WET, LEVEL, DISAGREE, MEASURED, DRIVEN, LATENESS, UNDECIDED, SPEED, LEVELS = range(11)

@@ -53,7 +53,6 @@ from monitor.observer.decision_state import (
     USUAL_FRICTION,
     USUAL_LASTING,
     USUAL_MEDIUM,
-    USUAL_RESPONSE,
     USUAL_SHORT,
     VERDICT,
     VISCOUS,
@@ -135,6 +134,7 @@ def decide(  # noqa: PLR0917 -- a kernel
     jumped: NDArray[np.bool_],
     steady: NDArray[np.bool_],
     usual: FloatArray,
+    response: FloatArray,
     state: Codes,
     rules: DecisionRules,
     kept: DecisionState,
@@ -151,7 +151,7 @@ def decide(  # noqa: PLR0917 -- a kernel
             _follow_inputs(kept, judged[k], usual[:, k], rules)
             _remember(kept, judged[k], speed[k], levels[k])
         _follow_jumps(jumped[k], kept)
-        _one(k, inside[k], usual[:, k], rules, kept, out)
+        _one(k, inside[k], usual[:, k], response[k], rules, kept, out)
 
 
 @njit()
@@ -269,6 +269,7 @@ def _one(  # noqa: PLR0917 -- a kernel
     k: int,
     inside: bool,
     usual: FloatArray,
+    response: float,
     rules: DecisionRules,
     kept: DecisionState,
     out: FloatArray,
@@ -295,8 +296,8 @@ def _one(  # noqa: PLR0917 -- a kernel
     largest = max(np.sqrt(short), np.sqrt(medium), deviations / allowed)
     lasting = lasting_energy(kept, spread**2 * usual[USUAL_LASTING] * margin)
     # A motion of another size than under the same drive before: slow evidence, never at once.
-    response = min(usual[USUAL_RESPONSE], SURE)
-    out[DEVIATION, k] = max(largest, np.sqrt(out[SENSORS, k]), np.sqrt(lasting), response)
+    size = min(response, SURE)
+    out[DEVIATION, k] = max(largest, np.sqrt(out[SENSORS, k]), np.sqrt(lasting), size)
     away = out[DEVIATION, k] > 1.0
     count[QUIET] = 0 if away else count[QUIET] + 1
     count[ABOVE] = count[ABOVE] + 1 if away else 0

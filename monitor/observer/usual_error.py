@@ -65,6 +65,19 @@ class Motion(NamedTuple):
     bands: tuple[float, ...] = (0.0,) * BANDS
 
 
+class Usual(NamedTuple):
+    """What a healthy rig does at the motion of each sample.
+
+    Attributes:
+        extremes: of the residual, infinite where they are not known, shape (4, n).
+        response: deviation of the motion's size from that under the same drive, 1 at its limit, 0
+            where the drive was not recorded, shape (n,).
+    """
+
+    extremes: FloatArray
+    response: FloatArray
+
+
 class UsualError:
     """The extremes of the healthy residual at each sample's motion, block by block.
 
@@ -77,11 +90,8 @@ class UsualError:
         self._known = tuple(_known(limits))
         self._smooth = _Smooth(rate)
 
-    def update(self, seen: Spectrum, drive: FloatArray, bands: FloatArray) -> FloatArray:
-        """The extremes after each sample and the deviation of the motion's size, shape (5, n).
-
-        Extremes are infinite where they are not known. The deviation is 1 at its limit, and 0 where
-        the drive was not recorded.
+    def update(self, seen: Spectrum, drive: FloatArray, bands: FloatArray) -> Usual:
+        """What is usual after each sample.
 
         Args:
             seen: the motion.
@@ -104,7 +114,7 @@ class UsualError:
         for known in (smaller, driven):
             found = np.where(found > 0.0, found, known)
         extremes = np.where(steady & (found > 0.0), found, np.inf)
-        return np.vstack([extremes, self._response(smooth, settled, drive, bands)])
+        return Usual(extremes, self._response(smooth, settled, drive, bands))
 
     def _response(
         self, smooth: Spectrum, settled: NDArray[np.bool_], drive: FloatArray, bands: FloatArray

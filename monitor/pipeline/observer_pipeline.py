@@ -109,11 +109,11 @@ class ObserverMonitor:
         usual = self._usual.update(motion, seen.drive, seen.bands)
         decide(
             seen.judged, speed, grown, drive, inside, np.asarray(jumped.any(axis=1)),
-            steady, usual, seen.state, self.rules, self._state, out,
+            steady, usual.extremes, usual.response, seen.state, self.rules, self._state, out,
         )  # fmt: skip
         conditions = self._conditions(admitted, seen, far, out)
         sensors = (*self._jump_conditions(admitted, jumped, out), *self._clipping.update(admitted))
-        limit = self._force_limit(out, usual[d.USUAL_FRICTION])
+        limit = self._force_limit(out, usual.extremes[d.USUAL_FRICTION])
         return Result(self._estimates(block, admitted, seen, out, limit), (*conditions, *sensors))
 
     def _hidden_edges(self, admitted: Admitted) -> NDArray[np.bool_]:

@@ -104,7 +104,7 @@ def driven(seen: Spectrum, pace: float = SINE_PACE) -> np.ndarray:
 
 
 def usual(seen: Spectrum, pace: float = SINE_PACE) -> np.ndarray:
-    return UsualError(limits(), RATE).update(seen, driven(seen, pace), no_drive(seen))[0]
+    return UsualError(limits(), RATE).update(seen, driven(seen, pace), no_drive(seen)).extremes[0]
 
 
 def no_drive(seen: Spectrum) -> np.ndarray:
@@ -127,7 +127,7 @@ def test_a_smaller_motion_of_the_same_kind_leaves_no_more(ratio: float) -> None:
     windows = {"steady_shorts": (3.0,), "steady_mediums": (2.0,), "steady_frictions": (4.0,)}
     known = structs.replace(limits(), **windows)
 
-    found = UsualError(known, RATE).update(seen, driven(seen), no_drive(seen))[:, SETTLED:]
+    found = UsualError(known, RATE).update(seen, driven(seen), no_drive(seen)).extremes[:, SETTLED:]
 
     assert np.isinf(found[0]).all()
     energy = ratio**-2
@@ -143,7 +143,7 @@ def test_a_motion_recorded_at_its_own_size_is_compared_with_that() -> None:
         larger[name] = 2 * getattr(known, name)
     both = structs.replace(known, **larger)
 
-    found = UsualError(both, RATE).update(seen, driven(seen), no_drive(seen))[0]
+    found = UsualError(both, RATE).update(seen, driven(seen), no_drive(seen)).extremes[0]
     assert np.all(found[SETTLED:] == KNOWN)
 
 
@@ -153,9 +153,37 @@ def test_a_larger_motion_leaves_no_more_under_the_drive_that_was_recorded(volts,
     bands = np.tile([0.0, 0.1, 0.3, 0.1, 0.0, 0.0, 0.0], (seen.pace.size, 1))
     known = structs.replace(limits(), steady_motion_bands=tuple(bands[0].tolist()))
 
-    found = UsualError(known, RATE).update(seen, driven(seen), volts**2 * bands)[0]
+    found = UsualError(known, RATE).update(seen, driven(seen), volts**2 * bands).extremes[0]
 
     assert np.all(found[SETTLED:] == expected)
+
+
+@pytest.mark.parametrize(
+    ("size", "volts", "deviates"),
+    [(0.2, 1.0, False), (0.185, 1.0, False), (0.17, 1.0, True), (0.24, 1.0, True),
+     (0.17, 1.5, False)],
+    ids=["same", "nearly", "smaller", "larger", "another drive"],
+)  # fmt: skip
+def test_a_motion_of_another_size_under_the_recorded_drive_deviates(size, volts, deviates) -> None:
+    seen = spectrum(8.0, size)
+    bands = np.tile([0.0, 0.1, 0.3, 0.1, 0.0, 0.0, 0.0], (seen.pace.size, 1))
+    known = structs.replace(limits(), steady_motion_bands=tuple(bands[0].tolist()))
+
+    found = UsualError(known, RATE).update(seen, driven(seen), volts**2 * bands).response
+
+    assert np.all((found[SETTLED:] > 1.0) == deviates)
+
+
+def test_a_size_may_differ_by_more_where_the_drive_is_faster() -> None:
+    seen = spectrum(8.0, 0.175)
+    bands = np.tile([0.0, 0.1, 0.3, 0.1, 0.0, 0.0, 0.0], (seen.pace.size, 1))
+    known = structs.replace(limits(), steady_motion_bands=tuple(bands[0].tolist()))
+
+    paces = (driven(seen, times * SINE_PACE) for times in (1.0, 1.02))
+    same, faster = (UsualError(known, RATE).update(seen, pace, bands).response for pace in paces)
+
+    assert np.all(same[SETTLED:] > 1.0)
+    assert np.all(faster[SETTLED:] < 1.0)
 
 
 def test_a_motion_by_another_drive_has_none() -> None:
@@ -166,7 +194,7 @@ def test_a_model_file_without_drives_knows_the_motion_by_any() -> None:
     seen, older = spectrum(8.0), structs.replace(limits(), steady_drives=())
 
     pace = driven(seen, TRIANGLE_PACE)
-    found = UsualError(older, RATE).update(seen, pace, no_drive(seen))[0]
+    found = UsualError(older, RATE).update(seen, pace, no_drive(seen)).extremes[0]
 
     assert np.all(found[SETTLED:] == KNOWN)
 
@@ -191,7 +219,9 @@ def test_any_cut_gives_the_same_limit() -> None:
 
     drive = driven(seen), no_drive(seen)
     parts = [
-        cut.update(Spectrum(*(figure[a:b] for figure in seen)), *(each[a:b] for each in drive))[0]
+        cut.update(
+            Spectrum(*(figure[a:b] for figure in seen)), *(each[a:b] for each in drive)
+        ).extremes[0]
         for a, b in pairwise((0, 1, 9, 1500, 1540, 3072))
     ]
 

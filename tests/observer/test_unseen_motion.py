@@ -60,7 +60,7 @@ def test_limits_grow_only_where_the_motion_was_not_recorded(usual: float, ratio:
         out = np.zeros((len(d.OUTPUTS), n))
         decide(
             judged.copy(), np.ones(n), levels, np.ones(n), ~zeros, zeros, ~zeros,
-            np.full((4, n), usual), state, rules, new_state(1), out,
+            np.full((4, n), usual), np.zeros(n), state, rules, new_state(1), out,
         )  # fmt: skip
         deviations.append(out[d.DEVIATION, -1])
         assert friction_limit(np.array([np.inf, 1.0]), rules)[1] == pytest.approx(1.6)

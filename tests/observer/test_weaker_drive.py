@@ -24,7 +24,7 @@ def verdict(residual: np.ndarray, driven: np.ndarray, speed: np.ndarray) -> floa
     ones, zeros, out = np.ones(n, np.bool_), np.zeros(n, np.bool_), np.zeros((len(d.OUTPUTS), n))
     decide(
         judged, speed, np.zeros((n, 1)), np.ones(n), ones, zeros, ones, np.full((4, n), np.inf),
-        state, rules, new_state(1), out,
+        np.zeros(n), state, rules, new_state(1), out,
     )  # fmt: skip
     return float(out[d.VERDICT, -1])
 

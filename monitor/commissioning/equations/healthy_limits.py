@@ -168,10 +168,11 @@ def _tried(part: HealthyPart, rules: DecisionRules) -> FloatArray:
     inside, steady, jumped = np.ones((3, len(part.state)), np.bool_)
     jumped[:] = False
     usual = np.full((len(Extremes._fields), len(part.state)), np.inf)
+    response = np.zeros(len(part.state))
     kept = new_state(part.levels.shape[1])
     decide(
         part.judged, part.speed, part.levels, part.drive, inside, jumped, steady, usual,
-        part.state, rules, kept, out,
+        response, part.state, rules, kept, out,
     )  # fmt: skip
     out[SPREAD] = np.maximum(out[SPREAD], rules.noise)
     return out
