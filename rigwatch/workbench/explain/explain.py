@@ -6,10 +6,12 @@ from dataclasses import dataclass, field, replace
 from rigwatch.workbench.compare import (
     Bench,
     Comparison,
+    Decided,
     added_variances,
     comparison,
     open_bench,
     unweighed,
+    with_hold_decided,
 )
 from rigwatch.workbench.experiment import Experiment, propose
 from rigwatch.workbench.explain.adequacy import (
@@ -165,7 +167,7 @@ def explained(bench: Bench, progress: Progress = no_progress) -> Explained:
         progress: called with a line of text as each part begins.
     """
     bench = with_adequate_base(bench, progress)
-    rows, verdict = ranking(bench, progress)
+    bench, rows, verdict = _ranked(bench, progress)
     bench = with_lower_floor(bench, rows)
     if verdict.word in STRENGTH_TOLD and bench.data.along_motion:
         progress("finding what the healthy recording leaves open of the strength")
@@ -186,12 +188,24 @@ def _with_exchange(bench: Bench, found: Explanation, progress: Progress) -> Expl
 
 def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked], Verdict]:
     """The ranking, with the effect named by the verdict first, and the verdict."""
+    return _ranked(bench, progress)[1:]
+
+
+def _ranked(bench: Bench, progress: Progress) -> tuple[Bench, list[Ranked], Verdict]:
+    """The study with its hold decided, its ranking, and the verdict."""
     stopped = _stopped(bench)
     if stopped is not None:
         rows = rank_all(bench.study, bench.data, bench.base)
-        return rows, with_base_offered(bench, stopped)
+        return bench, rows, with_base_offered(bench, stopped)
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
-    bench = with_lower_floor(bench, rows)
+    decided = with_hold_decided(bench, rows, progress)
+    bench, rows = decided.bench, decided.rows
+    found, verdict = _judged(with_lower_floor(bench, rows), rows, progress)
+    return bench, found, _with_rival_hold(decided, verdict)
+
+
+def _judged(bench: Bench, rows: list[Ranked], progress: Progress) -> tuple[list[Ranked], Verdict]:
+    """The verdict on a ranking, with the effect that it names first."""
     verdict = credible_verdict(bench, rows)
     rows, verdict = _refined(bench, rows, verdict, progress)
     along = bench.data.along_motion
@@ -213,6 +227,15 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
     return rows, verdict
+
+
+def _with_rival_hold(decided: Decided, verdict: Verdict) -> Verdict:
+    """The verdict, undetermined if another effect explains as much with another hold."""
+    rival = decided.rival
+    if verdict.word != "missing_effect" or not rival or rival in verdict.members:
+        return verdict
+    rivals = (*verdict.rivals, rival)
+    return replace(verdict, word="undetermined", rivals=rivals, text=decided.text)
 
 
 def _refined(
