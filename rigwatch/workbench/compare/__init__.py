@@ -3,6 +3,10 @@
 from rigwatch.workbench.compare.base_fit import Base
 from rigwatch.workbench.compare.base_search import Bases, find_base
 from rigwatch.workbench.compare.compare import Comparison, compare, comparison
+from rigwatch.workbench.compare.decided_hold import (
+    Decided,
+    with_hold_decided,
+)
 from rigwatch.workbench.compare.horizon import with_horizon_of
 from rigwatch.workbench.compare.locate import Region, locate, motion, sample_numbers
 from rigwatch.workbench.compare.preparation import (
@@ -21,6 +25,7 @@ __all__ = [
     "Bases",
     "Bench",
     "Comparison",
+    "Decided",
     "Region",
     "Warm",
     "added_variances",
@@ -36,5 +41,6 @@ __all__ = [
     "prepared",
     "sample_numbers",
     "unweighed",
+    "with_hold_decided",
     "with_horizon_of",
 ]

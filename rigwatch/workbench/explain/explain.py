@@ -6,10 +6,12 @@ from dataclasses import dataclass, field, replace
 from rigwatch.workbench.compare import (
     Bench,
     Comparison,
+    Decided,
     added_variances,
     comparison,
     open_bench,
     unweighed,
+    with_hold_decided,
 )
 from rigwatch.workbench.experiment import Experiment, propose
 from rigwatch.workbench.explain.adequacy import (
@@ -50,11 +52,12 @@ from rigwatch.workbench.ranking import (
     Progress,
     Ranked,
     no_progress,
+    own_floor,
     rank,
     rank_all,
     with_refinements,
 )
-from rigwatch.workbench.study import Study
+from rigwatch.workbench.study import Study, told
 
 STRENGTH_TOLD = ("missing_effect", "undetermined")
 """Verdicts of whose best effect the strength has its full uncertainty; fitting it takes time."""
@@ -165,33 +168,71 @@ def explained(bench: Bench, progress: Progress = no_progress) -> Explained:
         progress: called with a line of text as each part begins.
     """
     bench = with_adequate_base(bench, progress)
-    rows, verdict = ranking(bench, progress)
+    bench, rows, verdict = _ranked(bench, progress)
     bench = with_lower_floor(bench, rows)
     if verdict.word in STRENGTH_TOLD and bench.data.along_motion:
         progress("finding what the healthy recording leaves open of the strength")
     found = explanation(bench, rows, verdict)
-    if verdict.word == "unknown_effect" and bench.study.file.effects:
-        found = _with_exchange(bench, found, progress)
+    if bench.study.file.effects and _asks_for_exchange(bench, verdict):
+        found = _with_exchange(bench, found, verdict, progress)
     return Explained(bench, rows, found)
 
 
-def _with_exchange(bench: Bench, found: Explanation, progress: Progress) -> Explanation:
-    """The explanation with the effect that fits better than the last accepted one, if any does."""
+def _asks_for_exchange(bench: Bench, verdict: Verdict) -> bool:
+    """Whether too much is left to trust the last accepted effect: it may be of too simple a kind.
+
+    Beside a slider that should be behind play, another effect may stand for the play.
+    """
+    best = verdict.best
+    if verdict.word != "missing_effect" or best is None or best.fitted is None:
+        return verdict.word == "unknown_effect"
+    floor = own_floor(bench.study, bench.data, bench.floor, best)
+    return not floor.reached(best.fitted.held_out)
+
+
+def _with_exchange(
+    bench: Bench, found: Explanation, verdict: Verdict, progress: Progress
+) -> Explanation:
+    """The explanation with the effect that fits better than the last accepted one, if any does.
+
+    If an effect is named that leaves more beside the accepted one, it is undetermined.
+    """
     offer = exchange(bench, progress)
-    if offer is None:
+    named = verdict.best if verdict.word == "missing_effect" else None
+    if offer is None or (named is not None and named.held_out_error <= offer.held_out_error):
         return found
-    told = offer.text(bench.base.told_in, str(bench.study.folder))
-    return replace(found, text=f"{found.text}; but {told}", exchange=offer)
+    unit = bench.base.told_in
+    told_offer = offer.text(unit, str(bench.study.folder))
+    if named is None:
+        return replace(found, text=f"{found.text}; but {told_offer}", exchange=offer)
+    left = told(named.held_out_error, unit)
+    text = f"{told_offer}; {named.label} beside {offer.instead_of}@{offer.port} only to {left:.3g}"
+    rivals = [*found.rivals, f"{offer.effect}@{offer.port}"]
+    return replace(
+        found, verdict="undetermined", text=f"{text} {unit}", rivals=rivals, exchange=offer
+    )
 
 
 def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked], Verdict]:
     """The ranking, with the effect named by the verdict first, and the verdict."""
+    return _ranked(bench, progress)[1:]
+
+
+def _ranked(bench: Bench, progress: Progress) -> tuple[Bench, list[Ranked], Verdict]:
+    """The study with its hold decided, its ranking, and the verdict."""
     stopped = _stopped(bench)
     if stopped is not None:
         rows = rank_all(bench.study, bench.data, bench.base)
-        return rows, with_base_offered(bench, stopped)
+        return bench, rows, with_base_offered(bench, stopped)
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
-    bench = with_lower_floor(bench, rows)
+    decided = with_hold_decided(bench, rows, progress)
+    bench, rows = decided.bench, decided.rows
+    found, verdict = _judged(with_lower_floor(bench, rows), rows, progress)
+    return bench, found, _with_rival_hold(decided, verdict)
+
+
+def _judged(bench: Bench, rows: list[Ranked], progress: Progress) -> tuple[list[Ranked], Verdict]:
+    """The verdict on a ranking, with the effect that it names first."""
     verdict = credible_verdict(bench, rows)
     rows, verdict = _refined(bench, rows, verdict, progress)
     along = bench.data.along_motion
@@ -213,6 +254,15 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
     return rows, verdict
+
+
+def _with_rival_hold(decided: Decided, verdict: Verdict) -> Verdict:
+    """The verdict, undetermined if another effect explains as much with another hold."""
+    rival = decided.rival
+    if verdict.word != "missing_effect" or not rival or rival in verdict.members:
+        return verdict
+    rivals = (*verdict.rivals, rival)
+    return replace(verdict, word="undetermined", rivals=rivals, text=decided.text)
 
 
 def _refined(

@@ -22,7 +22,13 @@ from rigwatch.workbench.fit.healthy_parameters import (
 )
 from rigwatch.workbench.fit.healthy_reference import with_healthy_reference
 from rigwatch.workbench.fit.healthy_remainder import learns_from_healthy, with_healthy_remainder
-from rigwatch.workbench.fit.input_hold import held_as, with_hold
+from rigwatch.workbench.fit.input_hold import (
+    explains_more,
+    held_as,
+    may_hide_slow,
+    with_hold,
+    with_hold_beside,
+)
 from rigwatch.workbench.fit.intervals import (
     Value,
     as_written,
@@ -44,6 +50,7 @@ __all__ = [
     "covariance",
     "eigenvalues",
     "error_text",
+    "explains_more",
     "fit_base",
     "fit_model",
     "fit_with_retry",
@@ -52,6 +59,7 @@ __all__ = [
     "interval_with_held",
     "learns_from_healthy",
     "may_be_local_minimum",
+    "may_hide_slow",
     "nodes",
     "placements_of",
     "poorly_determined",
@@ -64,6 +72,7 @@ __all__ = [
     "with_healthy_reference",
     "with_healthy_remainder",
     "with_hold",
+    "with_hold_beside",
     "with_kept_free",
     "with_values",
 ]

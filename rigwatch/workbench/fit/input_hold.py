@@ -11,9 +11,13 @@ A healthy recording is used if available, as a fault cannot be mistaken for a ho
 
 Inputs that are seen to be held, as their steps start and end at rest, are not taken as lines,
 however far off the model is: a line through a step begins half a sample before the step.
+
+An input that seems late may hide what is slow in the machine. Whether a later hold than need be was
+chosen can be asked, and the hold be chosen anew with an effect in the model.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -73,20 +77,84 @@ def with_hold(study: Study, data: Data, scale: FloatArray | None = None) -> Stud
         return replace(study, model=with_holds(model, dict.fromkeys(names, ("linear", 0.0))))
     source_data = data.of_healthy or data
     placements = () if data.healthy is not None else placements_of(study, data.train)
+    # The healthy recording is modelled without the accepted effects.
+    start = parameters_of(study.file) if placements else dict(study.file.start)
+    try_one = partial(_tried, study, source_data, placements, scale)
+    line = try_one("linear", 0.0, start, None)
+    noise = quiet_scale(source_data.train) if scale is None else scale
+    best = _chosen(study, source_data, try_one, line, noise)
     source = HEALTHY if data.healthy is not None else RECORDINGS
-    best, line = _chosen(study, source_data, placements, scale)
+    return _held_as_chosen(study, source_data, line, best, source)
+
+
+def may_hide_slow(study: Study, data: Data) -> bool:
+    """Whether inputs act later than they could, as far as the recordings alone have shown."""
+    names = _from_recordings(study)
+    if not names:
+        return False
+    chosen, free = study.holds[names[0]], _with_holds_open(study, names)
+    return chosen.late > 0.0 or (chosen.hold == "zero" and not _seen_held(free, data))
+
+
+def with_hold_beside(
+    study: Study, data: Data, base: Fitted, beside: Sequence[Placement]
+) -> tuple[str, Study, Fitted]:
+    """The study with the hold that its recordings show with the best of some effects in the model.
+
+    Args:
+        study: its hold is chosen from its recordings.
+        data: its recordings.
+        base: its model fitted with that hold.
+        beside: the effects, one of which is added.
+
+    Returns:
+        The effect as "effect@port", the study, and its model fitted with the effect.
+
+    Raises:
+        ModelError: the model cannot be fitted with any of them.
+    """
+    free = _with_holds_open(study, _from_recordings(study))
+    start = base.train.values()
+    lines = list[tuple[Placement, _Tried]]()
+    for placement in beside:
+        with suppress(ModelError):
+            line = _tried(
+                free, data, (*base.placements, placement), base.train.scale,
+                "linear", 0.0, start, base,
+            )  # fmt: skip
+            lines.append((placement, line))
+    if not lines:
+        raise ModelError("the model cannot be fitted with something slow at any port")
+    placement, line = min(lines, key=lambda pair: _size(pair[1]))
+    try_one = partial(_tried, free, data, (*base.placements, placement), base.train.scale)
+    best = _chosen(free, data, try_one, line, quiet_scale(data.train))
+    label = f"{placement.name}@{placement.port}"
+    return label, _held_as_chosen(free, data, line, best), best.fitted
+
+
+def _from_recordings(study: Study) -> list[str]:
+    """Inputs whose hold was chosen by fits to the recordings."""
+    return [n for n, held in study.holds.items() if held.source == RECORDINGS and not held.ends]
+
+
+def _with_holds_open(study: Study, names: Sequence[str]) -> Study:
+    """The study without the holds of some inputs."""
+    known = {name: held for name, held in study.holds.items() if name not in names}
+    model = with_holds(study.model, dict.fromkeys(names, (None, 0.0)))
+    return replace(study, model=model, holds=known)
+
+
+def _held_as_chosen(
+    study: Study, data: Data, line: _Tried, best: _Tried, source: str = RECORDINGS
+) -> Study:
+    """The study with the best hold for each input without one."""
     before, after = (float(np.nanmean(_blocks(each.fitted))) for each in (line, best))
-    held = Held(
-        best.hold, best.late, source_data.train.dt * best.late, source, (after / before) ** 0.5
-    )
-    return replace(
-        study,
-        model=with_holds(model, dict.fromkeys(names, (best.hold, best.late))),
-        holds={**study.holds, **dict.fromkeys(names, held)},
-    )
+    ratio = (after / before) ** 0.5
+    held = Held(best.hold, best.late, data.train.dt * best.late, source, ratio)
+    return held_as(study, {**study.holds, **dict.fromkeys(study.model.unheld(), held)})
 
 
-def with_holds(model: Model, holds: Mapping[str, tuple[Hold, float]]) -> Model:
+def with_holds(model: Model, holds: Mapping[str, tuple[Hold | None, float]]) -> Model:
     """The model with the holds of some inputs set."""
     inputs = {
         name: structs.replace(own, hold=holds[name][0], late=holds[name][1])
@@ -104,19 +172,16 @@ def held_as(study: Study, holds: Mapping[str, Held]) -> Study:
 
 
 def _chosen(
-    study: Study, data: Data, placements: tuple[Placement, ...], scale: FloatArray | None
-) -> tuple[_Tried, _Tried]:
-    """The best hold, and a line."""
-    try_one = partial(_tried, study, data, placements, scale)
-    # The healthy recording is modelled without the accepted effects.
-    start = parameters_of(study.file) if placements else dict(study.file.start)
-    line = try_one("linear", 0.0, start, None)
+    study: Study, data: Data, try_one: "partial[_Tried]", line: _Tried, noise: FloatArray
+) -> _Tried:
+    """The best hold; a line is tried."""
     kept = try_one("zero", 0.0, line.fitted.train.values(), line.fitted)
-    best = kept if _seen_held(study, data) or _better(kept, line) else line
-    if data.along_motion or _at_noise(best, data, scale):
-        return best, line
+    seen = _seen_held(study, data)
+    best = kept if seen or explains_more(kept.fitted, line.fitted) else line
+    if data.along_motion or _at_noise(best, noise):
+        return best
     late = _refined(partial(try_one, "zero"), kept)
-    return (late if late is not None and _better(late, best) else best), line
+    return late if late is not None and explains_more(late.fitted, best.fitted) else best
 
 
 def _seen_held(study: Study, data: Data) -> bool:
@@ -184,16 +249,24 @@ def _refined(try_late: "partial[_Tried]", kept: _Tried) -> _Tried | None:
 
 
 def _size(tried: _Tried) -> float:
+    return _training_size(tried.fitted)
+
+
+def _training_size(fitted: Fitted) -> float:
     """Mean squared error over the blocks of the training."""
-    return float(np.nanmean(block_errors(tried.fitted.train)))
+    return float(np.nanmean(block_errors(fitted.train)))
 
 
-def _better(one: _Tried, other: _Tried) -> bool:
-    """Whether the error falls by more than chance from the other to the one, in training too."""
-    if _size(one) > _size(other):
+def explains_more(one: Fitted, other: Fitted) -> bool:
+    """Whether the error falls by more than chance from the other to the one, in training too.
+
+    Args:
+        one, other: fits to the same recordings, over windows of the same length.
+    """
+    if _training_size(one) > _training_size(other):
         return False
-    before = _blocks(other.fitted)
-    fall = block_differences(other.fitted.held_out, one.fitted.held_out)
+    before = _blocks(other)
+    fall = block_differences(other.held_out, one.held_out)
     spread = float(np.std(fall, ddof=1) / np.sqrt(len(fall))) if len(fall) > 1 else 0.0
     mean = float(np.mean(fall))
     return mean > BEYOND_CHANCE * spread and mean > MATERIAL * float(np.nanmean(before))
@@ -203,6 +276,5 @@ def _blocks(fitted: Fitted) -> FloatArray:
     return block_errors(fitted.held_out)
 
 
-def _at_noise(tried: _Tried, data: Data, scale: FloatArray | None) -> bool:
-    noise = quiet_scale(data.train) if scale is None else scale
+def _at_noise(tried: _Tried, noise: FloatArray) -> bool:
     return float(np.sqrt(np.mean((tried.fitted.train.rms / noise) ** 2))) < AT_NOISE

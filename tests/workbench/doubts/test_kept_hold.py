@@ -8,7 +8,9 @@ import pytest
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import parse_model
 from rigwatch.physics.engine.fit.recording import Recording
+from rigwatch.workbench.compare.preparation import bench_of
 from rigwatch.workbench.data.signals import Data
+from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.fit.input_hold import stepped, with_hold
 from rigwatch.workbench.steps.trial import try_add
 from rigwatch.workbench.study.study import Study
@@ -28,20 +30,28 @@ ports.meter = { kind = "sensor", signal = "warmer" }
 SLOW, BLOCK_TIME, SAMPLES = 2.0, 20.0, 400
 
 
-def run(seed: int, steady: int) -> dict[str, np.ndarray]:
-    """Power held for some seconds at a time, and the thermometer's reading, both exact."""
+def run(seed: int, steady: int, slow_s: float = SLOW, late: float = 0.0) -> dict[str, np.ndarray]:
+    """Power held for some seconds at a time, and the thermometer's reading, both exact.
+
+    Each power acts from a part `late` of its second on.
+    """
     draw = np.random.default_rng(seed)
     power = np.repeat(draw.uniform(0, 100, SAMPLES // steady + 1), steady)[:SAMPLES]
-    own, slow = np.exp(-1 / BLOCK_TIME), np.exp(-1 / SLOW)
-    carried = (own - slow) / (1 - SLOW / BLOCK_TIME)
     block = read = 0.0
     told = []
-    for held in power:
+    for acting, held in zip(np.concatenate([power[:1], power[:-1]]), power, strict=True):
         told.append(read)
-        gap = block - held
-        read = held + carried * gap + slow * (read - held)
-        block = held + own * gap
-    return {"power": power, "warmer": np.array(told) + draw.normal(0, 0.05, SAMPLES)}
+        block, read = warmed(block, read, acting, late, slow_s)
+        block, read = warmed(block, read, held, 1.0 - late, slow_s)
+    return {"power": power, "warmer": np.array(told)}
+
+
+def warmed(block: float, read: float, held: float, time_s: float, slow_s: float):
+    """Block and reading after some time of constant power."""
+    own, slow = np.exp(-time_s / BLOCK_TIME), np.exp(-time_s / slow_s)
+    carried = (own - slow) / (1 - slow_s / BLOCK_TIME)
+    warm = held + (block - held) * own
+    return warm, held + (block - held) * carried + (read - held) * slow
 
 
 def test_an_input_is_not_late_once_the_slow_sensor_is_in_the_model(tmp_path):
@@ -53,16 +63,35 @@ def test_an_input_is_not_late_once_the_slow_sensor_is_in_the_model(tmp_path):
     assert trial.change.after.held_out_error < 0.06
 
 
-def test_steps_are_held_though_the_model_is_far_off():
+def in_memory(steady: int, noise: float = 0.0, **more: float) -> tuple[Study, Data]:
     def recording(seed: int) -> Recording:
-        table = run(seed, 40)
-        return Recording(1.0, table["power"][:, None], table["warmer"][:, None])
+        table, draw = run(seed, steady, **more), np.random.default_rng(seed + 100)
+        reading = table["warmer"] + noise * draw.normal(size=SAMPLES)
+        return Recording(1.0, table["power"][:, None], reading[:, None])
 
     span = (Span(session="simulated"),)
     file = StudyFile(model="block.toml", train=span, held_out=span)
     study = Study(Path(), file, parse_model(BLOCK, Path("block.toml")), library(), frozenset())
-    data = Data(recording(1), recording(2), None, 40, ())
-    assert with_hold(study, data).model.held("power") == "zero"
+    return study, Data(recording(1), recording(2), None, 40, ())
+
+
+def test_steps_are_held_though_the_model_is_far_off():
+    assert with_hold(*in_memory(40)).model.held("power") == "zero"
+
+
+def test_a_slow_sensor_that_a_lateness_hid_is_named():
+    bench = bench_of(*in_memory(6, slow_s=1.0, late=0.6))
+    assert bench.study.holds["power"].late > 0.9
+    verdict = ranking(bench)[1]
+    assert verdict.word == "missing_effect"
+    assert verdict.members[0] in {"lag@meter", "lag@heater"}
+
+
+def test_a_verdict_that_depends_on_the_hold_is_undetermined_and_says_so():
+    verdict = ranking(bench_of(*in_memory(6, noise=0.3, slow_s=0.7, late=0.6)))[1]
+    assert verdict.word == "undetermined"
+    assert verdict.rivals[-1].startswith("lag@")
+    assert " of a sample late explain this recording equally well" in verdict.text
 
 
 TIME = np.arange(300) / 100

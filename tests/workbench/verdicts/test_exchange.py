@@ -32,7 +32,11 @@ def slider_behind(gap: float):
     return force
 
 
-@pytest.mark.parametrize(("gap", "offered"), [(0.003, "jenkins_behind_gap"), (0.0, None)])
+@pytest.mark.parametrize(
+    ("gap", "offered"),
+    [(0.003, "jenkins_behind_gap"), (0.0008, "jenkins_behind_gap"), (0.0, None)],
+    ids=["wide", "narrow, for which a drag stands in", "none"],
+)
 def test_a_slider_that_turns_out_to_be_behind_play_is_offered_in_its_place(
     tmp_path: Path, gap: float, offered: str | None
 ) -> None:
@@ -41,6 +45,7 @@ def test_a_slider_that_turns_out_to_be_behind_play_is_offered_in_its_place(
     before = explain(open_study(study.folder))
     found = before.exchange
     assert (found.effect if found else None) == offered
+    assert before.verdict != "missing_effect"
     if found is None:
         return
     assert "in place of jenkins@load" in before.text
