@@ -64,15 +64,20 @@ def _missing(blocks: Sequence[tuple[int, int, int]]) -> Iterator[str]:
             yield f"samples {seq + n} to {next_seq - 1} are missing"
 
 
-def complaints(alarms: Sequence[Alarm], recording: Recording, seen: range) -> list[str]:
+def complaints(
+    alarms: Sequence[Alarm], recording: Recording, seen: range, exit_code: int = 0
+) -> list[str]:
     """Why the demonstration failed; empty if it succeeded.
 
     Args:
         alarms: alarms raised during the run.
         recording: the recording.
         seen: sample numbers received by another reader of the bus.
+        exit_code: of `rigwatch up`.
     """
     found = list(recording.faults)
+    if exit_code:
+        found.append(f"rigwatch up ended with code {exit_code}")
     if seen and not (recording.first <= seen.start and seen.stop <= recording.end):
         has, saw = f"{recording.first} to {recording.end - 1}", f"{seen.start} to {seen.stop - 1}"
         found.append(f"samples {has} are in it, but {saw} were on the bus")

@@ -29,6 +29,7 @@ def workbench_pages(folder: Path, rig: Path, say: Callable[[str], None]) -> Iter
         return
     studies = folder / "studies"
     studies.mkdir(exist_ok=True)
+    say("two pages follow: open the dashboard first, the rig live; the workbench studies an alarm")
     process = subprocess.Popen(
         [sys.executable, "-m", "rigwatch", "workbench", str(studies), "--rig", str(rig), "--json"],
         stdout=subprocess.PIPE,
@@ -48,4 +49,5 @@ def _tell(process: "subprocess.Popen[str]", say: Callable[[str], None]) -> None:
     assert process.stdout is not None
     line = process.stdout.readline()
     if line:
-        say(f"to see the rig and study its alarms, open {json.loads(line)['address']}")
+        address = json.loads(line)["address"]
+        say(f"  workbench: open {address} once an alarm has come")
