@@ -74,6 +74,11 @@ class Narrator:
             if not self._last.begins:
                 self._announce("next", self._last.seq)
 
+    @property
+    def fault_begun(self) -> bool:
+        """Whether the first fault has begun."""
+        return self._last is not None
+
     def begin(self, seq: int) -> None:
         """Say that faults are planned, and how long after this sample the first comes."""
         if self._next is not None:

@@ -179,7 +179,10 @@ class Show:
         assert self._up is not None
         code = self._up.returncode
         seen = range(self._first, self._seen)
-        found = complaints(self._narrator.alarms, recording, seen, code)
+        found = complaints(
+            self._narrator.alarms, recording, seen,
+            exit_code=code, fault_begun=self._narrator.fault_begun,
+        )  # fmt: skip
         seconds = recording.samples / self._config.rig.sample_rate
         whole = "; ".join(recording.faults) or "none missing"
         session = relative(recording.path)

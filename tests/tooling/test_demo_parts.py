@@ -207,6 +207,8 @@ def test_missing_samples_are_found(
 
 def test_a_wrong_name_no_alarm_and_no_estimates_are_complained_about(recorded: Recorded) -> None:
     recording = read_recording(recorded(samples(0, 512)))
+    early = complaints([], recording, range(512), fault_begun=False)
+    assert early == ["it ended before a fault", "no estimates are in the recording"]
     found = complaints([alarm("other_fault")], recording, range(512))
     assert any("no alarm named dry friction; alarms: other_fault" in line for line in found)
     assert any("not in the recording" in line for line in found)
