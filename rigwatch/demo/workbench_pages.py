@@ -29,7 +29,9 @@ def workbench_pages(folder: Path, rig: Path, say: Callable[[str], None]) -> Iter
         return
     studies = folder / "studies"
     studies.mkdir(exist_ok=True)
-    say("two pages follow: open the dashboard first, the rig live; the workbench studies an alarm")
+    say(
+        "two views follow: first the dashboard, the rig live; then the workbench, to study an alarm"
+    )
     process = subprocess.Popen(
         [sys.executable, "-m", "rigwatch", "workbench", str(studies), "--rig", str(rig), "--json"],
         stdout=subprocess.PIPE,
