@@ -10,11 +10,16 @@ the mass is held while the other forces are weaker).
 Symbols: x position [m], v velocity [m/s], u commanded force [N], F force that acts [N].
 """
 
+# Fields of a record are known to numba, not to mypy.
+# mypy: disable-error-code="no-any-return"
+
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from rigwatch.wire.arrays import FloatArray
@@ -27,8 +32,12 @@ LARGEST = 40.0
 """Force at which the drive saturates, divided by 1 + the strength [N]."""
 STEPS = 64
 """Integration steps between two samples."""
+H = 1.0 / (RATE * STEPS)
+"""Length of a step [s]."""
 MASS, DAMPING, STIFFNESS = 0.8, 1.5, 60.0
 """[kg], [N s/m], [N/m]."""
+STOP, GAP = 0.12, 0.02
+"""Travel to the hard stop, and half of the gap in which backlash takes the spring away [m]."""
 
 EFFECTS: tuple[str, ...] = (
     "coulomb", "stribeck", "dahl", "quadratic_drag", "constant_force", "cubic_stiffness",
@@ -45,6 +54,14 @@ DIGITAL = EFFECTS[-6:]
 samples, rounded up. At the drive they apply only if the force is held from sample to sample.
 """
 UNKNOWN = ("van_der_pol", "maxwell", "pulsating_spring", "knocks")
+
+Record = Any
+"""One record of a structured array; numba compiles its fields as attributes."""
+STRENGTHS = np.dtype([(name, np.float64) for name in EFFECTS])
+MEMORY = np.dtype(
+    [(name, np.float64) for name in ("played", "yielded", "bent", "branch", "slow_x", "slow_a")]
+)
+"""States of the valve's hysteresis, of Bouc and Wen, Dahl and Maxwell, and of slow sensors."""
 
 
 @dataclass(frozen=True)
@@ -77,13 +94,13 @@ def oscillate(
         seed: seed of the noise.
         held: whether the force is held from sample to sample, as by a converter; else linear.
     """
-    strengths = np.zeros(len(EFFECTS))
+    strengths = np.zeros(1, STRENGTHS)
     for effect in hidden:
-        strengths[EFFECTS.index(effect.name)] = effect.strength
+        strengths[effect.name] = effect.strength
     digital = {effect.name: effect.strength for effect in hidden if effect.name in DIGITAL}
     sent = _digital(np.asarray(force, np.float64), "drive", digital)
     clean = np.empty((len(force), 2))
-    _run(np.ascontiguousarray(sent), strengths, held, clean)
+    _run(np.ascontiguousarray(sent), strengths, held, clean, np.zeros(1, MEMORY))
     clean[:, 0] = _digital(clean[:, 0], "position", digital)
     clean[:, 1] = _digital(clean[:, 1], "acceleration", digital)
     return clean + noise * np.random.default_rng(seed).normal(size=clean.shape)
@@ -127,69 +144,105 @@ def _clipped(value: float, limit: float) -> float:
 
 
 @kernel()
-def _run(force: FloatArray, s: FloatArray, held: bool, out: FloatArray) -> None:  # noqa: C901, PLR0912, PLR0915 -- a kernel
-    h = 1.0 / (RATE * STEPS)
-    x, v, a, played, bent, yielded, branch = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    slow_x, slow_a = 0.0, 0.0
-    late = round(s[15] / h) if s[15] > 0 else 0
+def _drive_force(force: FloatArray, place: int, held: bool) -> float:
+    """The force at a step, between the samples of `force` [N]."""
+    place = max(place, 0)
+    row, part = place // STEPS, (place % STEPS) / STEPS
+    following = row if held else min(row + 1, len(force) - 1)
+    return force[row] + part * (force[following] - force[row])
+
+
+@kernel()
+def _after_drive(u: float, e: Record, memory: Record) -> float:
+    """The force that is left of u behind dead band, saturation and hysteresis of the drive [N]."""
+    if e.dead_band > 0:
+        u = u - _clipped(u, e.dead_band)
+    if e.saturation > 0:
+        u = _clipped(u, LARGEST / (1.0 + e.saturation))
+    if e.valve_hysteresis > 0:
+        memory.played = min(max(memory.played, u - e.valve_hysteresis), u + e.valve_hysteresis)
+        u = memory.played
+    return u
+
+
+@kernel()
+def _forces_of_the_motion(x: float, v: float, t: float, e: Record) -> float:
+    """Hidden forces that depend on the present motion alone, without dry friction [N]."""
+    force = e.quadratic_drag * v * abs(v) + e.cubic_stiffness * x**3
+    force += e.quadratic_stiffness * x * x + e.viscous_by_direction * abs(v)
+    force += e.van_der_pol * x * x * v - e.constant_force
+    force += e.pulsating_spring * np.sin(2 * np.pi * 0.7 * t) * x
+    force -= e.backlash * _clipped(x, GAP)
+    if abs(x) > STOP:
+        force += e.hard_stop * (x - np.sign(x) * STOP)
+    if e.knocks > 0 and (t % 1.7) < 0.02:
+        force -= e.knocks
+    return -force
+
+
+@kernel()
+def _forces_with_memory(v: float, e: Record, memory: Record) -> float:
+    """Hidden forces that remember the motion, after a step of it [N]."""
+    force = 0.0
+    if e.bouc_wen > 0:
+        memory.yielded += H * (
+            v
+            - 0.5 * abs(v) * memory.yielded * abs(memory.yielded) / 0.0025
+            - 0.5 * v * memory.yielded**2 / 0.0025
+        )
+        force -= e.bouc_wen * memory.yielded
+    if e.dahl > 0:
+        memory.bent += H * 50.0 * v * (1.0 - memory.bent * np.sign(v))
+        force -= e.dahl * memory.bent
+    if e.maxwell > 0:
+        memory.branch += H * (v - 2.0 * memory.branch)
+        force -= e.maxwell * memory.branch
+    return force
+
+
+@kernel()
+def _under_friction(v: float, other: float, dry: float) -> tuple[float, float]:
+    """Acceleration and velocity after a step under the other forces and dry friction."""
+    if dry > 0 and abs(v) * MASS < dry * H and abs(other) <= dry:
+        return 0.0, 0.0
+    towards = np.sign(v) if v != 0.0 else np.sign(other)
+    a = (other - dry * towards) / MASS
+    following = v + H * a
+    crosses = dry > 0 and v != 0.0 and np.sign(following) != np.sign(v)
+    return a, 0.0 if crosses and abs(other) <= dry else following
+
+
+@kernel()
+def _run(
+    force: FloatArray, strengths: NDArray[np.void], held: bool, out: FloatArray,
+    kept: NDArray[np.void],
+) -> None:  # fmt: skip
+    """Writes what the sensors read at each sample to `out`, shape (n, 2)."""
+    e: Record = strengths[0]
+    memory: Record = kept[0]
+    x, v, a = 0.0, 0.0, 0.0
+    late = round(e.delay / H) if e.delay > 0 else 0
     for k in range(len(force)):
         read_x, read_a = x, 0.0
         for step in range(STEPS):
-            place = k * STEPS + step - late
-            row, part = max(place, 0) // STEPS, (max(place, 0) % STEPS) / STEPS
-            following = row if held else min(row + 1, len(force) - 1)
-            u = force[row] + part * (force[following] - force[row])
-            t = (k * STEPS + step) * h
-            if s[12] > 0:
-                u = u - _clipped(u, s[12])
-            if s[13] > 0:
-                u = _clipped(u, LARGEST / (1.0 + s[13]))
-            if s[14] > 0:
-                played = min(max(played, u - s[14]), u + s[14])
-                u = played
-            now = v + 0.5 * h * a
+            u = _drive_force(force, k * STEPS + step - late, held)
+            u = _after_drive(u, e, memory)
+            now = v + 0.5 * H * a  # v is half a step behind x
             other = u - STIFFNESS * x - DAMPING * now
-            other -= s[3] * now * abs(now) + s[5] * x**3 + s[6] * x * x + s[11] * abs(now)
-            other += s[4]
-            stop = 0.12
-            if abs(x) > stop:
-                other -= s[7] * (x - np.sign(x) * stop)
-            other += s[8] * _clipped(x, 0.02)
-            if s[9] > 0:
-                yielded += h * (
-                    v
-                    - 0.5 * abs(v) * yielded * abs(yielded) / 0.0025
-                    - 0.5 * v * yielded**2 / 0.0025
-                )
-                other -= s[9] * yielded
-            if s[2] > 0:
-                bent += h * 50.0 * v * (1.0 - bent * np.sign(v))
-                other -= s[2] * bent
-            other -= s[21] * x * x * now
-            if s[22] > 0:
-                branch += h * (v - 2.0 * branch)
-                other -= s[22] * branch
-            other -= s[23] * np.sin(2 * np.pi * 0.7 * t) * x
-            if s[24] > 0 and (t % 1.7) < 0.02:
-                other += s[24]
-            dry = s[0] + s[1] * np.exp(-((now / 0.08) ** 2)) + s[10] * (x / 0.1) ** 4
-            if dry > 0 and abs(v) * MASS < dry * h and abs(other) <= dry:
-                a, v = 0.0, 0.0
-            else:
-                towards = np.sign(v) if v != 0.0 else np.sign(other)
-                a = (other - dry * towards) / MASS
-                following_v = v + h * a
-                crosses = dry > 0 and v != 0.0 and np.sign(following_v) != np.sign(v)
-                v = 0.0 if crosses and abs(other) <= dry else following_v
+            other += _forces_of_the_motion(x, now, (k * STEPS + step) * H, e)
+            other += _forces_with_memory(v, e, memory)
+            dry = e.coulomb + e.stribeck * np.exp(-((now / 0.08) ** 2))
+            dry += e.end_binding * (x / 0.1) ** 4
+            a, v = _under_friction(v, other, dry)
             if step == 0:
                 if k == 0:
-                    slow_a, slow_x = a, x
-                read_a = slow_a if s[16] > 0 else a
-                read_x = slow_x if s[17] > 0 else x
-            x += h * v
-            if s[17] > 0:
-                slow_x += (x - slow_x) * -np.expm1(-h / s[17])
-            if s[16] > 0:
-                slow_a += (a - slow_a) * -np.expm1(-h / s[16])
-        out[k, 0] = read_x + s[19] + s[20] * k / RATE
-        out[k, 1] = read_a * (1.0 + s[18])
+                    memory.slow_a, memory.slow_x = a, x
+                read_a = memory.slow_a if e.acceleration_lag > 0 else a
+                read_x = memory.slow_x if e.position_lag > 0 else x
+            x += H * v
+            if e.position_lag > 0:
+                memory.slow_x += (x - memory.slow_x) * -np.expm1(-H / e.position_lag)
+            if e.acceleration_lag > 0:
+                memory.slow_a += (a - memory.slow_a) * -np.expm1(-H / e.acceleration_lag)
+        out[k, 0] = read_x + e.position_offset + e.position_drift * k / RATE
+        out[k, 1] = read_a * (1.0 + e.acceleration_gain)

@@ -21,10 +21,8 @@ the mass sticks exactly at any level.
 # Fields of a record are known to numba, not to mypy.
 # mypy: disable-error-code="no-any-return"
 
-# Everything that `advance_plant` calls is in this file: numba's cache ignores changes in others.
-
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,6 +154,64 @@ def upstream(lift: float, supply: float, p: Record) -> float:
     return p.atmosphere + supply * (pressure - p.atmosphere)
 
 
+class Passages(NamedTuple):
+    """Conductances of the orifices [m^3/s], and the ports' laminar resistance [Pa s/m^3]."""
+
+    port: float
+    port_resistance: float
+    piston: float
+    outward_1: float
+    outward_2: float
+
+
+@kernel(error_model="numpy")
+def passages(p: Record, e: Record) -> Passages:
+    """The passages of the air with their blockage and leaks."""
+    clear = 1.0 - e.port_blockage
+    return Passages(
+        orifice(p.port_area, p) * clear,
+        p.port_resistance / clear**2,
+        orifice(p.piston_leak + e.chamber_leak, p),
+        orifice(e.leak_1, p),
+        orifice(e.leak_2, p),
+    )
+
+
+@kernel(error_model="numpy")
+def chambers(  # noqa: PLR0917
+    p1: float, p2: float, pu1: float, pu2: float, x: float, v: float, h: float,
+    ways: Passages, p: Record,
+) -> tuple[float, float]:  # fmt: skip
+    """Pressures of the chambers after a step of h [s] that ends at x with velocity v [Pa]."""
+    hn = h * p.heat_capacity_ratio
+    across = flow(p1, p2, ways.piston, p.leak_resistance)
+    into_1 = flow(pu1, p1, ways.port, ways.port_resistance) - across
+    into_2 = flow(pu2, p2, ways.port, ways.port_resistance) + across
+    if ways.outward_1 > 0.0:
+        into_1 -= flow(p1, p.atmosphere, ways.outward_1, p.leak_resistance)
+    if ways.outward_2 > 0.0:
+        into_2 -= flow(p2, p.atmosphere, ways.outward_2, p.leak_resistance)
+    half, middle = 0.5 * p.stroke, x - 0.5 * h * v
+    volume_1 = p.dead_volume + p.piston_area * max(half + middle, 0.0)
+    volume_2 = p.dead_volume + p.annulus_area * max(half - middle, 0.0)
+    swept_1, swept_2 = 0.5 * hn * p.piston_area * v, -0.5 * hn * p.annulus_area * v
+    return (
+        (p1 * (volume_1 - swept_1) + hn * into_1) / (volume_1 + swept_1),
+        (p2 * (volume_2 - swept_2) + hn * into_2) / (volume_2 + swept_2),
+    )
+
+
+@kernel(error_model="numpy")
+def couple(s: Record, load: float, rigid: bool, p: Record) -> None:
+    """Piston and load as one mass from now on, which keeps their momentum, or as two."""
+    if rigid:
+        if s.apart > 0.0:
+            s.v = (p.piston_mass * s.v + load * s.load_v) / (p.piston_mass + load)
+            s.x = s.load_x
+        s.load_x, s.load_v = s.x, s.v
+    s.apart = 0.0 if rigid else 1.0
+
+
 @kernel(error_model="numpy")
 def advance_plant(  # noqa: PLR0915, PLR0917
     command: Floats,
@@ -176,14 +232,8 @@ def advance_plant(  # noqa: PLR0915, PLR0917
     e: Record = effects[0]
     s: Record = state[0]
     h = 1.0 / (p.sample_rate * p.substeps)
-    hn = h * p.heat_capacity_ratio
     area_1, area_2 = p.piston_area, p.annulus_area
-    half = 0.5 * p.stroke
-    clear = 1.0 - e.port_blockage
-    port, resistance = orifice(p.port_area, p) * clear, p.port_resistance / clear**2
-    leak = orifice(p.piston_leak + e.chamber_leak, p)
-    leak_1, leak_2 = orifice(e.leak_1, p), orifice(e.leak_2, p)
-    supply = 1.0 - e.supply_drop
+    ways, supply = passages(p, e), 1.0 - e.supply_drop
     spread = math.sqrt(p.valve_damping**2 - 1.0)
     valve = 2.0 * math.pi * p.valve_frequency
     share_1 = 1.0 - math.exp(-h * valve * (p.valve_damping - spread))
@@ -196,12 +246,7 @@ def advance_plant(  # noqa: PLR0915, PLR0917
     viscous = e.viscous + (p.piston_viscous if rigid else 0.0)
     braked = 1.0 / (1.0 + per_mass * viscous)
     steps_per_second = p.sample_rate * p.substeps
-    if rigid:
-        if s.apart > 0.0:
-            s.v = (p.piston_mass * s.v + load * s.load_v) / (p.piston_mass + load)
-            s.x = s.load_x
-        s.load_x, s.load_v = s.x, s.v
-    s.apart = 0.0 if rigid else 1.0
+    couple(s, load, rigid, p)
     x, v, load_x, load_v, a = s.x, s.v, s.load_x, s.load_v, s.a
     p1, p2, valve_1, valve_2 = s.P1, s.P2, s.valve_1, s.valve_2
     friction, sensed = s.friction, s.sensed_a
@@ -249,19 +294,7 @@ def advance_plant(  # noqa: PLR0915, PLR0917
             else:
                 x += h * v
 
-            across = flow(p1, p2, leak, p.leak_resistance)
-            into_1 = flow(pu1, p1, port, resistance) - across
-            into_2 = flow(pu2, p2, port, resistance) + across
-            if leak_1 > 0.0:
-                into_1 -= flow(p1, p.atmosphere, leak_1, p.leak_resistance)
-            if leak_2 > 0.0:
-                into_2 -= flow(p2, p.atmosphere, leak_2, p.leak_resistance)
-            middle = x - 0.5 * h * v
-            volume_1 = p.dead_volume + area_1 * max(half + middle, 0.0)
-            volume_2 = p.dead_volume + area_2 * max(half - middle, 0.0)
-            swept_1, swept_2 = 0.5 * hn * area_1 * v, -0.5 * hn * area_2 * v
-            p1 = (p1 * (volume_1 - swept_1) + hn * into_1) / (volume_1 + swept_1)
-            p2 = (p2 * (volume_2 - swept_2) + hn * into_2) / (volume_2 + swept_2)
+            p1, p2 = chambers(p1, p2, pu1, pu2, x, v, h, ways, p)
     s.x, s.v, s.load_x, s.load_v, s.a = x, v, load_x, load_v, a
     s.P1, s.P2, s.valve_1, s.valve_2 = p1, p2, valve_1, valve_2
     s.friction, s.sensed_a = friction, sensed

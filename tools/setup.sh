@@ -32,6 +32,8 @@ make_venv() {
         tools/debian_packages.sh python3-venv || exit 1
     fi
     echo "setup: virtual environment $venv with $("$python" --version)"
+    # Here alone, as further locks are added to the environment that this makes.
+    echo "setup: usually about a minute in all, more where the network is slow"
     "$python" -m venv --clear "$venv"
 }
 
@@ -62,13 +64,8 @@ progress() {
     done
 }
 
-packages_of() {
-    cat "$@" | grep -c '^[A-Za-z0-9]'
-}
-
-echo "setup: $(packages_of "$@") packages, usually about a minute in all, more where the network is slow"
 for lock in "$@"; do
-    packages=$(packages_of "$lock")
+    packages=$(grep -c '^[A-Za-z0-9]' "$lock")
     echo "setup: $lock: $packages packages"
     { install "$lock" || { cat "$venv/setup-errors.txt" >&2 && echo "setup failed"; }; } \
         | progress "$packages"

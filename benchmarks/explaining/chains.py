@@ -25,7 +25,7 @@ from rigwatch.workbench.compare import open_bench
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.ranking import Ranked
-from rigwatch.workbench.steps import whole
+from rigwatch.workbench.steps import accepted_with_model
 from rigwatch.workbench.study import Study
 from sim_plant.machines import RIGHT, Answer, judged
 from tools.benchmark_table import Row, as_text
@@ -77,7 +77,7 @@ def solve(case: Case) -> Outcome:
             steps.append(step)
             if chosen is None:
                 break
-            study = study.with_effects([*study.file.effects, whole(chosen)])
+            study = study.with_effects([*study.file.effects, accepted_with_model(chosen)])
         return Outcome(case, tuple(steps))
 
 

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.watching.thesis_thresholds import Thresholds, thesis_thresholds
 from monitor.commissioning.friction_filter import (
     GAMMAS,
     FrictionFilter,
     fit_friction_filter,
 )
-from monitor.estimation.thesis_thresholds import Thresholds, thesis_thresholds
 from monitor.estimation.window import new_window, windowed_least_squares
 from rigwatch.physics.transfer.output_error import OutputErrorOrders
 from rigwatch.physics.transfer.transfer_function import TransferFunction

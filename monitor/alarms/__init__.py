@@ -4,7 +4,7 @@ The core is pure (`AlarmManager`); only `journal.py` touches a file. One table, 
 every alarm with its severity, cause, guidance and default settings.
 """
 
-from monitor.alarms.journal import AlarmJournal, journal_text, last_records, read_journal
+from monitor.alarms.journal import AlarmJournal, journal_text, read_journal
 from monitor.alarms.kinds import ALARM_KINDS, AlarmKind, check_settings, settings_of
 from monitor.alarms.manager import AlarmManager, Announcement
 from monitor.alarms.operator import bounded
@@ -25,7 +25,6 @@ __all__ = [
     "check_settings",
     "journal_text",
     "just_returned",
-    "last_records",
     "read_journal",
     "settings_of",
 ]

@@ -205,11 +205,6 @@ def journal_text(records: Iterable[AlarmRecord]) -> bytes:
     return b"".join(map(_line, records))
 
 
-def last_records(records: Iterable[AlarmRecord]) -> list[AlarmRecord]:
-    """The newest record of each alarm, which a restarted monitor restores."""
-    return list({record.alarm.name: record for record in records}.values())
-
-
 def _lines(file: BinaryIO) -> Iterator[bytes]:
     """The lines of a journal; overlong lines are truncated."""
     while line := file.readline(LONGEST_LINE):

@@ -22,7 +22,7 @@ import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rigwatch.commands.any_text import write_any_text
 from rigwatch.commands.unwinding import unwound_at_signal
@@ -136,7 +136,15 @@ def every_command(
 
 
 class _Parser(argparse.ArgumentParser):
-    """Raises when its help cannot be written, which argparse passes over."""
+    """Raises when its help cannot be written, which argparse passes over.
+
+    Help and errors write what the user replaces in capitals, as they do for options.
+    """
+
+    def add_argument(self, *names: str, **options: Any) -> argparse.Action:
+        if not names[0].startswith("-") and "choices" not in options:
+            options.setdefault("metavar", names[0].upper())
+        return super().add_argument(*names, **options)
 
     def _print_message(self, message: str, file: "SupportsWrite[str] | None" = None) -> None:
         print(message, end="", file=file or sys.stderr)

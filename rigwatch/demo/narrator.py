@@ -1,12 +1,13 @@
 """Narrates the demonstration.
 
-It reports what is done to the rig, which the monitor does not know, and the monitor's alarms.
+It reports what is done to the rig, which the monitor does not know, the monitor's alarms, and what
+the monitor finds to be missing in its model.
 """
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from rigwatch.wire.messages import Alarm
+from rigwatch.wire.messages import PROBABLY_MISSING, Alarm, Event
 from sim_plant.scenario import Scenario
 
 ACTS = {
@@ -71,13 +72,24 @@ class Narrator:
             self._say(f"{self._time(self._last.seq)} the rig: {self._last.text}")
             self._next = next(self._acts, None)
             if not self._last.begins:
-                self.announce(self._last.seq)
+                self._announce("next", self._last.seq)
 
-    def announce(self, seq: int) -> None:
-        """Say how long after this sample the next fault comes; nothing if none does."""
+    @property
+    def fault_begun(self) -> bool:
+        """Whether the first fault has begun."""
+        return self._last is not None
+
+    def begin(self, seq: int) -> None:
+        """Say that faults are planned, and how long after this sample the first comes."""
+        if self._next is not None:
+            self._say("            the demo puts faults into the rig and takes them out again")
+        self._announce("first", seq)
+
+    def _announce(self, which: str, seq: int) -> None:
+        """Say how long after this sample a fault comes; nothing if none does."""
         if self._next is not None and self._next.begins:
             wait = (self._next.seq - seq) / self._rate
-            self._say(f"            the next fault comes in {wait:.0f} s; Ctrl-C ends the demo")
+            self._say(f"            the {which} fault comes in {wait:.0f} s; Ctrl-C ends the demo")
 
     def judged(self, seq: int) -> None:
         """Report the end of an alarm once the monitor is a second of samples past it.
@@ -102,6 +114,12 @@ class Narrator:
             self._ended = alarm
             if alarm.name != NAMELESS:
                 self._tell_end()
+
+    def explain(self, event: Event) -> None:
+        """Report which effect the monitor finds to be missing in its model since an alarm."""
+        if event.code == PROBABLY_MISSING:
+            found = event.text.rpartition("probably missing: ")[2]
+            self._say(f"            probably missing in the rig's model: {found}")
 
     def _tell_end(self) -> None:
         """Report the end of an alarm; that of a departure only if no named fault replaced it."""

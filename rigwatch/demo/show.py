@@ -19,7 +19,16 @@ from rigwatch.recorder import newest
 from rigwatch.wire.bus import connect, unique_process
 from rigwatch.wire.errors import DeviceError
 from rigwatch.wire.host import end_process
-from rigwatch.wire.messages import ALARMS, ESTIMATES, SAMPLES, Alarm, EstimateBlock, SampleBlock
+from rigwatch.wire.messages import (
+    ALARMS,
+    ESTIMATES,
+    EVENTS,
+    SAMPLES,
+    Alarm,
+    EstimateBlock,
+    Event,
+    SampleBlock,
+)
 from rigwatch.wire.rig_config import load_rig
 from sim_plant.scenario import load_scenario
 
@@ -29,11 +38,19 @@ STOP_TIMEOUT = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The result of a demonstration."""
+    """The result of a demonstration.
+
+    Attributes:
+        alarms: raised during it.
+        recording: what the recorder kept of it.
+        complaints: why it failed; empty if it succeeded.
+        exit_code: of `rigwatch up`.
+    """
 
     alarms: tuple[Alarm, ...]
     recording: Recording
     complaints: tuple[str, ...]
+    exit_code: int
 
     def as_dict(self) -> dict[str, Any]:
         """The result as plain values, for `--json`."""
@@ -89,7 +106,7 @@ class Show:
     def _watch(self, seconds: float, after_named: float) -> None:
         bus = connect(self._config, unique_process("demo"))
         samples, estimates = bus.subscribe(SAMPLES), bus.subscribe(ESTIMATES)
-        alarms = bus.subscribe(ALARMS)
+        alarms, events = bus.subscribe(ALARMS), bus.subscribe(EVENTS)
         rate = self._config.rig.sample_rate
         give_up = time.monotonic() + START_TIMEOUT
         try:
@@ -99,6 +116,9 @@ class Show:
                 # A missing device is not reported before the simulated device is up.
                 if alarm is not None and self._seen:
                     self._narrator.alarm(alarm)
+                told: list[Event] = events.drain()
+                for event in told:
+                    self._narrator.explain(event)
                 judged: list[EstimateBlock] = estimates.drain()
                 if judged and alarm is None:
                     self._narrator.judged(judged[-1].seq + len(judged[-1]))
@@ -118,7 +138,7 @@ class Show:
         if not self._seen:
             self._say("samples arrive: the rig moves, healthy so far")
             self._first = blocks[0].seq
-            self._narrator.announce(self._first)
+            self._narrator.begin(self._first)
         self._seen = blocks[-1].seq + len(blocks[-1])
         self._narrator.samples(self._seen)
 
@@ -144,6 +164,8 @@ class Show:
 
     def _stop(self) -> None:
         assert self._up is not None
+        if self._up.poll() is not None:
+            return
         self._say("stopping the rig; the recording is closed")
         # A second Ctrl-C must not leave a half written file behind.
         previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -154,7 +176,13 @@ class Show:
 
     def _judge(self) -> Outcome:
         recording = read_recording(newest(self._folder / "sessions", self._config.rig.id))
-        found = complaints(self._narrator.alarms, recording, range(self._first, self._seen))
+        assert self._up is not None
+        code = self._up.returncode
+        seen = range(self._first, self._seen)
+        found = complaints(
+            self._narrator.alarms, recording, seen,
+            exit_code=code, fault_begun=self._narrator.fault_begun,
+        )  # fmt: skip
         seconds = recording.samples / self._config.rig.sample_rate
         whole = "; ".join(recording.faults) or "none missing"
         session = relative(recording.path)
@@ -163,4 +191,4 @@ class Show:
             self._say(f"demo: {complaint}")
         self._say(f"look into it:  rigwatch info {session}")
         self._say(f"replay it:     rigwatch replay {session}")
-        return Outcome(tuple(self._narrator.alarms), recording, tuple(found))
+        return Outcome(tuple(self._narrator.alarms), recording, tuple(found), code)

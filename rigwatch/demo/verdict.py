@@ -64,26 +64,41 @@ def _missing(blocks: Sequence[tuple[int, int, int]]) -> Iterator[str]:
             yield f"samples {seq + n} to {next_seq - 1} are missing"
 
 
-def complaints(alarms: Sequence[Alarm], recording: Recording, seen: range) -> list[str]:
+def complaints(
+    alarms: Sequence[Alarm],
+    recording: Recording,
+    seen: range,
+    *,
+    exit_code: int = 0,
+    fault_begun: bool = True,
+) -> list[str]:
     """Why the demonstration failed; empty if it succeeded.
 
     Args:
         alarms: alarms raised during the run.
         recording: the recording.
         seen: sample numbers received by another reader of the bus.
+        exit_code: of `rigwatch up`.
+        fault_begun: whether the first fault had begun before the end.
     """
     found = list(recording.faults)
+    if exit_code:
+        found.append(f"rigwatch up ended with code {exit_code}")
     if seen and not (recording.first <= seen.start and seen.stop <= recording.end):
         has, saw = f"{recording.first} to {recording.end - 1}", f"{seen.start} to {seen.stop - 1}"
         found.append(f"samples {has} are in it, but {saw} were on the bus")
-    named = [alarm for alarm in alarms if alarm.name == ALARM]
-    if not named:
-        others = ", ".join(alarm.name for alarm in alarms) or "none at all"
-        found.append(f"no alarm named dry friction; alarms: {others}")
-    elif WORDS not in named[0].cause.lower():
-        found.append(f"the alarm does not say dry friction: {named[0].cause}")
-    if ALARM not in recording.alarms:
-        found.append("the alarm is not in the recording")
+    found += list(_of_alarms(alarms, recording)) if fault_begun else ["it ended before a fault"]
     if recording.estimates == 0:
         found.append("no estimates are in the recording")
     return found
+
+
+def _of_alarms(alarms: Sequence[Alarm], recording: Recording) -> Iterator[str]:
+    named = [alarm for alarm in alarms if alarm.name == ALARM]
+    if not named:
+        others = ", ".join(alarm.name for alarm in alarms) or "none at all"
+        yield f"no alarm named dry friction; alarms: {others}"
+    elif WORDS not in named[0].cause.lower():
+        yield f"the alarm does not say dry friction: {named[0].cause}"
+    if ALARM not in recording.alarms:
+        yield "the alarm is not in the recording"

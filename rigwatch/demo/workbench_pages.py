@@ -29,6 +29,9 @@ def workbench_pages(folder: Path, rig: Path, say: Callable[[str], None]) -> Iter
         return
     studies = folder / "studies"
     studies.mkdir(exist_ok=True)
+    say(
+        "two views follow: first the dashboard, the rig live; then the workbench, to study an alarm"
+    )
     process = subprocess.Popen(
         [sys.executable, "-m", "rigwatch", "workbench", str(studies), "--rig", str(rig), "--json"],
         stdout=subprocess.PIPE,
@@ -48,4 +51,5 @@ def _tell(process: "subprocess.Popen[str]", say: Callable[[str], None]) -> None:
     assert process.stdout is not None
     line = process.stdout.readline()
     if line:
-        say(f"to see the rig and study its alarms, open {json.loads(line)['address']}")
+        address = json.loads(line)["address"]
+        say(f"  workbench: open {address} once an alarm has come")

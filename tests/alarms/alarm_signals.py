@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from monitor.alarms import AlarmManager, Announcement
+from monitor.alarms import AlarmManager, AlarmRecord, Announcement
 from monitor.signals.conditions import Condition
 from rigwatch.wire.messages.message_types import Alarm, AlarmCommand, Event
 
@@ -19,6 +19,11 @@ def condition(name: str, active: Sequence[int] | np.ndarray) -> Condition:
     place = np.arange(len(flags), dtype=float)
     one = np.ones(len(flags))
     return Condition(name, flags, place, -one, one)
+
+
+def newest(records: Iterable[AlarmRecord]) -> list[AlarmRecord]:
+    """The newest record of each alarm, which a restarted monitor restores."""
+    return list({record.alarm.name: record for record in records}.values())
 
 
 def spell(n: int, *stretches: tuple[int, int]) -> np.ndarray:

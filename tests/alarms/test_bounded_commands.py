@@ -1,9 +1,9 @@
 """What a command may claim: the monitor's clock counts, and texts have bounds."""
 
-from monitor.alarms import AlarmManager, Occasion, bounded, last_records
+from monitor.alarms import AlarmManager, Occasion, bounded
 from monitor.alarms.operator import MAX_CLOCK_DIFFERENCE_NS
 from rigwatch.wire.messages import LONGEST_NAME, LONGEST_TEXT, Alarm, AlarmCommand
-from tests.alarms.alarm_signals import condition, run, spell, time_of
+from tests.alarms.alarm_signals import condition, newest, run, spell, time_of
 
 YEAR_NS = 365 * 86_400 * 1_000_000_000
 HOURS_8_NS = 8 * 3600 * 1_000_000_000
@@ -34,7 +34,7 @@ def test_a_journal_poisoned_with_a_long_shelf_is_cut_on_reading() -> None:
     old = friction()
     old.command(AlarmCommand("dry_friction", "shelve", "ann", NOW + 50 * YEAR_NS))
     new = AlarmManager()
-    new.restore(last_records(old.take_changes()), NOW)
+    new.restore(newest(old.take_changes()), NOW)
     said = new.report("disk", Occasion(t_ns=NOW + HOURS_8_NS + 1), active=False)
     assert [one.name for one in said if isinstance(one, Alarm)] == ["dry_friction"]
 

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from monitor.alarms import AlarmJournal, AlarmManager, last_records, read_journal
+from monitor.alarms import AlarmJournal, AlarmManager, read_journal
 from rigwatch.wire.errors import SessionError
-from tests.alarms.alarm_signals import condition, order, run, spell
+from tests.alarms.alarm_signals import condition, newest, order, run, spell
 
 ROOT = Path(__file__).parents[2]
 
@@ -42,7 +42,7 @@ def states(manager: AlarmManager) -> dict[str, str]:
 
 def restarted(path: Path) -> AlarmManager:
     alarms = AlarmManager()
-    alarms.restore(last_records(read_journal(path)[0]))
+    alarms.restore(newest(read_journal(path)[0]))
     return alarms
 
 
@@ -208,7 +208,7 @@ def test_a_journal_that_has_grown_is_rotated_and_keeps_the_state_of_every_alarm(
         f"alarms.jsonl.{number}" for number in range(1, 9)
     ]
     expected = AlarmManager()
-    expected.restore(last_records(changes))
+    expected.restore(newest(changes))
     assert restarted(path).standing() == expected.standing() != []
     reopened = AlarmJournal(path)
     assert {one.alarm.name for one in reopened.newest()} == {one.alarm.name for one in changes}

@@ -2,10 +2,10 @@
 
 import pytest
 
-from monitor.alarms import AlarmManager, Occasion, last_records
+from monitor.alarms import AlarmManager, Occasion
 from rigwatch.wire.messages.message_types import Alarm
 from rigwatch.wire.rig_config import AlarmSection
-from tests.alarms.alarm_signals import codes, condition, order, spell, steps, time_of, times
+from tests.alarms.alarm_signals import codes, condition, newest, order, spell, steps, time_of, times
 
 SECOND = 256
 HOUR = 3600 * SECOND
@@ -19,7 +19,7 @@ def restarted(
     old: AlarmManager, seq: int, **settings: AlarmSection
 ) -> tuple[AlarmManager, list[Alarm]]:
     new = AlarmManager(settings)
-    return new, new.restore(last_records(old.take_changes()), time_of(seq))
+    return new, new.restore(newest(old.take_changes()), time_of(seq))
 
 
 def flooded() -> AlarmManager:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -27,8 +28,10 @@ def test_help_of_every_command_has_an_example_that_names_it(
     with pytest.raises(SystemExit) as exit_:
         main([*name.split()[1:], "--help"])
     assert exit_.value.code == 0
-    _, _, example = capsys.readouterr().out.partition("example:")
+    said, _, example = capsys.readouterr().out.partition("example:")
     assert name in example
+    replaced = re.findall(r"^  ([^\s-]\S*)", said, re.MULTILINE)
+    assert all(word == word.upper() or word.startswith("{") for word in replaced)
 
 
 @pytest.mark.parametrize("group", ["structure", "study"])

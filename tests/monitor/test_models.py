@@ -11,7 +11,6 @@ from scipy.stats import chi2
 from monitor.commissioning.commission import commission
 from monitor.commissioning.friction_filter import fit_friction_filter
 from monitor.decision.decision_rules import chance_a_look, rules_for
-from monitor.estimation.thesis_thresholds import thesis_thresholds
 from monitor.model.model_file import RigModel, load_model, model_text
 from monitor.pipeline.pipeline import Monitor
 from monitor.signals.inertia import commission_inertia, kernels
@@ -94,13 +93,6 @@ def test_the_factor_keeps_the_chance_it_promises() -> None:
     chance = chance_a_look(model().decision.false_alarm, model().sample_rate)
     assert np.exp(-(rules.factor**2) / 2.0) == pytest.approx(chance, rel=1e-6)
     assert chi2.sf(rules.limit_64, 64) == pytest.approx(chance, rel=1e-3)
-
-
-def test_published_thresholds_are_mean_and_three_deviations() -> None:
-    theta = np.random.default_rng(6).standard_normal((50, 2)) + 5.0
-    limits = thesis_thresholds(theta)
-    assert np.allclose(limits.high - limits.low, 6.0 * theta.std(axis=0, ddof=1))
-    assert limits.left(np.array([[50.0, 5.0]]))[0] == 1.0
 
 
 def test_kernels_differentiate_parabolas_exactly() -> None:

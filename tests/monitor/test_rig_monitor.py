@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from monitor.alarms import AlarmManager, Occasion, last_records
+from monitor.alarms import AlarmManager, Occasion
 from monitor.decision.sample_kernel import watch_block
 from monitor.pipeline.rig_monitor import RigMonitor, compile_kernels
 from rigwatch.wire.messages.message_types import Alarm, Column, SampleBlock
 from rigwatch.wire.messages.protobuf import decode, encode
+from tests.alarms.alarm_signals import newest
 from tests.monitor.monitor_rig import SINE, block, friction, model, run
 
 
@@ -44,7 +45,7 @@ def test_alarms_of_a_detector_that_is_gone_clear_after_a_restart_and_others_do_n
     old, new = AlarmManager(), RigMonitor(model())
     for name in ("parity_arma", "dry_friction", "link"):
         old.report(name, Occasion("rig", 1, 9, 9), active=True)
-    new.alarms.restore(last_records(old.take_changes()))
+    new.alarms.restore(newest(old.take_changes()))
     watched = new.update(block(run(SINE, 1.0), 0, 64))
     assert watched is not None
     states = [(a.name, a.state) for a in watched.announcements if isinstance(a, Alarm)]

@@ -12,7 +12,8 @@ from rigwatch.demo.own_folder import own_folder
 from rigwatch.demo.rig_file import write_rig_file
 from rigwatch.demo.verdict import complaints, read_recording
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.wire.messages.message_types import Alarm, Column, EstimateBlock, SampleBlock
+from rigwatch.wire.messages import PROBABLY_MISSING
+from rigwatch.wire.messages.message_types import Alarm, Column, EstimateBlock, Event, SampleBlock
 from rigwatch.wire.rig_config import SerialSection, load_rig
 from rigwatch.wire.session import SessionWriter, run_info
 from rigwatch.wire.typed_files.shipped import find_config
@@ -139,14 +140,26 @@ def test_an_alarm_is_reported_with_its_cause_and_its_delay_after_what_was_done()
 def test_the_wait_for_the_next_fault_is_told_at_the_start_and_after_each_one() -> None:
     said: list[str] = []
     narrator = narrator_to(said)
-    narrator.announce(5 * RATE)
-    assert "the next fault comes in 15 s; Ctrl-C ends the demo" in said[-1]
+    narrator.begin(5 * RATE)
+    assert "the demo puts faults into the rig" in said[0]
+    assert "the first fault comes in 15 s; Ctrl-C ends the demo" in said[-1]
     narrator.samples(40 * RATE)
     assert "dry friction" in said[-1]
     narrator.samples(46 * RATE)
     assert "the next fault comes in 30 s" in said[-1]
     narrator.samples(96 * RATE)
     assert "the next fault comes in 45 s" in said[-1]  # the scenario has begun anew
+
+
+def test_what_is_missing_in_the_model_is_told_and_other_events_are_not() -> None:
+    said: list[str] = []
+    narrator = narrator_to(said)
+    text = "dry_friction: probably missing: coulomb@load (p < 1e-6, 99% of the change)"
+    narrator.explain(Event("monitor", 0, "error", PROBABLY_MISSING, text))
+    narrator.explain(Event("daq", 0, "warning", "CLOCK STEP", "the clock stepped"))
+    assert [line.strip() for line in said] == [
+        "probably missing in the rig's model: coulomb@load (p < 1e-6, 99% of the change)"
+    ]
 
 
 def test_a_departure_that_gets_a_name_has_not_gone() -> None:
@@ -173,6 +186,8 @@ def test_a_whole_recording_with_the_alarm_has_nothing_to_complain_about(
     recording = read_recording(path)
     assert (recording.samples, recording.estimates) == (768, 768)
     assert complaints([alarm()], recording, range(8, 768)) == []
+    crashed = complaints([alarm()], recording, range(8, 768), exit_code=-9)
+    assert crashed == ["rigwatch up ended with code -9"]
 
 
 @pytest.mark.parametrize(
@@ -192,6 +207,8 @@ def test_missing_samples_are_found(
 
 def test_a_wrong_name_no_alarm_and_no_estimates_are_complained_about(recorded: Recorded) -> None:
     recording = read_recording(recorded(samples(0, 512)))
+    early = complaints([], recording, range(512), fault_begun=False)
+    assert early == ["it ended before a fault", "no estimates are in the recording"]
     found = complaints([alarm("other_fault")], recording, range(512))
     assert any("no alarm named dry friction; alarms: other_fault" in line for line in found)
     assert any("not in the recording" in line for line in found)

@@ -14,13 +14,14 @@ from shutil import copy
 
 import pytest
 
-from monitor.alarms import AlarmManager, last_records, read_journal
+from monitor.alarms import AlarmManager, read_journal
 from monitor.process.cursor import Cursor
 from rigwatch.archive import Store, query
 from rigwatch.commands import main
 from rigwatch.recorder.positions import load_positions
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.session import open_session
+from tests.alarms.alarm_signals import newest
 
 HERE = Path(__file__).parent
 VERSIONS = sorted(path for path in HERE.iterdir() if (path / "session.mcap").is_file())
@@ -75,7 +76,7 @@ def test_a_monitor_goes_on_from_journal_and_position(version: Path, tmp_path: Pa
     records, unread = read_journal(version / "alarms.jsonl")
     assert unread == 0
     alarms = AlarmManager()
-    alarms.restore(last_records(records))
+    alarms.restore(newest(records))
     states = {alarm.name: alarm.state for alarm in alarms.standing()}
     state, seq = LEFT_AT[version.name]
     assert states["dry_friction"] == state

@@ -1,6 +1,7 @@
 """The model file of the observer: range of motion, healthy spread and limits."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from msgspec.structs import replace
@@ -22,6 +23,7 @@ from monitor.model import (
 from monitor.observer import (
     EMPTY,
     PREDICTED,
+    Layout,
     Observed,
     Spectrum,
     base_model,
@@ -33,6 +35,7 @@ from monitor.observer import (
     range_signals,
 )
 from monitor.signals import Recording
+from rigwatch.wire.arrays import FloatArray
 
 
 def equations_model(  # noqa: PLR0917 -- all that was found
@@ -55,30 +58,18 @@ def equations_model(  # noqa: PLR0917 -- all that was found
         roles: their roles.
         rate: sample rate [Hz].
     """
-    layout = layout_of(base_model(plant.model), plant.port)
-    slow, begin = slow_speed(parts, layout, plant), round(STARTED * rate)
-    signals = [range_signals(o)[o.state != EMPTY] for o in parts]
-    spectra = [spectrum_of(o, layout, slow, rate) for o in parts]
-    motions = [Spectrum(*(figure[begin:] for figure in each)) for each in spectra]
-    drives = [o.drive[begin:] for o in parts]
-    bends = bends_of(used, base_model(plant.model))
-    seen = range_of(layout.signals, signals, motions, drives, bends)
+    model = base_model(plant.model)
+    layout = layout_of(model, plant.port)
+    slow, skip = slow_speed(parts, layout, plant), round(SKIPPED * rate)
+    motions = _motions_of(parts, layout, slow, rate, bends_of(used, model))
+    every = range(len(parts))
+    seen = motions.range_of(every)
     healthy = [
-        HealthyPart(
-            o.judged,
-            np.ascontiguousarray(o.rows[:, layout.speed]),
-            levels(o.rows[:, list(layout.motions)], o.judged[:, PREDICTED], remainder),
-            drive_energy(o.rows, seen, layout.motions),
-            o.state,
-            motion,
-            drive,
-            o.bands[begin:],
-        )
-        for o, motion, drive in zip(parts, motions, drives, strict=True)
+        _healthy_part(part, motions.each[at], layout, seen, remainder)
+        for at, part in enumerate(parts)
     ]
-    skip = round(SKIPPED * rate)
     limits = healthy_limits(healthy, slow, skip, rate)
-    model = RigModel(
+    found = RigModel(
         sample_rate=rate,
         channels=layout.channels,
         plant=plant,
@@ -92,13 +83,73 @@ def equations_model(  # noqa: PLR0917 -- all that was found
             RecordingSection(role=one.role, name=one.name, sha256=one.sha256) for one in used
         ),
     )
+    unseen = largest_unseen(
+        found, parts, roles, lambda place: motions.range_of(at for at in every if at != place)
+    )
+    return replace(found, healthy=replace(limits, unseen=unseen))
 
-    def range_of_others(place: int) -> RangeSection:
-        kept = [k for k in range(len(parts)) if k != place]
+
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """The motion of one recording.
+
+    Attributes:
+        signals: those whose range is kept, shape (n, signals).
+        spectrum: of the motion after the start.
+        drive: paces of the drive after the start.
+        bands: energies of the drive after the start.
+    """
+
+    signals: FloatArray
+    spectrum: Spectrum
+    drive: FloatArray
+    bands: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Motions:
+    """The motion of all recordings.
+
+    Attributes:
+        names: of the signals.
+        each: the recordings.
+        bends: largest differences of channels that measure a state.
+    """
+
+    names: Sequence[str]
+    each: Sequence[_Motion]
+    bends: Mapping[str, float]
+
+    def range_of(self, places: Iterable[int]) -> RangeSection:
+        """The range of motion of some recordings."""
+        some = [self.each[place] for place in places]
         return range_of(
-            layout.signals, [signals[k] for k in kept], [motions[k] for k in kept],
-            [drives[k] for k in kept], bends,
+            self.names, [one.signals for one in some], [one.spectrum for one in some],
+            [one.drive for one in some], self.bends,
         )  # fmt: skip
 
-    unseen = largest_unseen(model, parts, roles, range_of_others)
-    return replace(model, healthy=replace(limits, unseen=unseen))
+
+def _motions_of(
+    parts: Sequence[Observed], layout: Layout, slow: float, rate: float, bends: Mapping[str, float]
+) -> _Motions:
+    begin, each = round(STARTED * rate), []
+    for part in parts:
+        spectrum = Spectrum(*(one[begin:] for one in spectrum_of(part, layout, slow, rate)))
+        signals = range_signals(part)[part.state != EMPTY]
+        each.append(_Motion(signals, spectrum, part.drive[begin:], part.bands[begin:]))
+    return _Motions(layout.signals, each, bends)
+
+
+def _healthy_part(
+    part: Observed, motion: _Motion, layout: Layout, seen: RangeSection, remainder: RemainderSection
+) -> HealthyPart:
+    return HealthyPart(
+        part.judged,
+        np.ascontiguousarray(part.rows[:, layout.speed]),
+        levels(part.rows[:, list(layout.motions)], part.judged[:, PREDICTED], remainder),
+        drive_energy(part.rows, seen, layout.motions),
+        part.state,
+        motion.spectrum,
+        motion.drive,
+        motion.bands,
+    )

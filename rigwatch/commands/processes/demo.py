@@ -61,4 +61,6 @@ def _run(arguments: argparse.Namespace, folder: Path) -> int:
         outcome = Show(rig, folder, say).play(seconds, after_named)
     if arguments.json:
         print(json.dumps(outcome.as_dict(), indent=1))
-    return 1 if arguments.headless and outcome.complaints else 0
+    # Whoever watches may end the demo before friction appears; a crash is a failure even then.
+    failed = outcome.complaints if arguments.headless else outcome.exit_code
+    return 1 if failed else 0

@@ -78,7 +78,7 @@ def _ordered(study: Study, data: Data, names: list[str]) -> Data:
         train=put_right(data.train),
         held_out=put_right(data.held_out),
         healthy=data.healthy and put_right(data.healthy),
-        telling=data.telling and put_right(data.telling),
+        openings=data.openings and put_right(data.openings),
     )
 
 

@@ -85,7 +85,7 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
 
     healthy = made(data.healthy) if data.healthy is not None else None
     train, held_out = made(data.train), made(data.held_out)
-    telling = made(data.telling) if data.telling is not None else None
+    openings = made(data.openings) if data.openings is not None else None
     longest = max(len(r) for r in (train, held_out, healthy) if r is not None)
     shown = ", ".join(state.name for state in measured_states(study.model))
     form = FORM.format(shown=shown, hidden=", ".join(model.states) or "no states")
@@ -94,7 +94,7 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
     remarks = (*data.remarks, form, *told, *motion_range_remarks(study, train, held_out, healthy))
     along = Data(
         train, held_out, healthy, longest, remarks, along_motion=True, motion=_sensors(study),
-        telling=telling, altered=data.altered,
+        openings=openings, altered=data.altered,
     )  # fmt: skip
     return replace(study, model=model), along
 

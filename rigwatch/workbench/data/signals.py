@@ -18,9 +18,9 @@ from rigwatch.workbench.data.columns import Columns, any_same, bridged
 from rigwatch.workbench.data.derived_ends import without_ends
 from rigwatch.workbench.data.next_rows import with_next_rows
 from rigwatch.workbench.data.one_rate import on_one_rate
+from rigwatch.workbench.data.openings import without_openings
 from rigwatch.workbench.data.recorded_columns import read_columns, with_derived
 from rigwatch.workbench.data.signal_units import check_unit
-from rigwatch.workbench.data.telling import divided
 from rigwatch.workbench.study import Span, Study, StudyFile
 
 USUAL = 0.5
@@ -60,8 +60,8 @@ class Data:
         remarks: notes for the user.
         along_motion: whether the recordings are for a model along its measured motion.
         motion: sensors whose position and rate are inputs of that model.
-        telling: first samples of held-out recordings that tell what moves between recordings; None
-            if nothing has to be told.
+        openings: first samples of held-out recordings, which determine what moves between
+            recordings; None if nothing does.
         altered: how the recordings differ from those on which verdicts are calibrated, in words.
     """
 
@@ -72,7 +72,7 @@ class Data:
     remarks: tuple[str, ...]
     along_motion: bool = False
     motion: tuple[MotionSensor, ...] = ()
-    telling: Recording | None = None
+    openings: Recording | None = None
     altered: tuple[str, ...] = ()
 
     @property
@@ -81,7 +81,7 @@ class Data:
         if self.healthy is None:
             return None
         own = self.healthy
-        return replace(self, train=own, held_out=own, healthy=None, remarks=(), telling=None)
+        return replace(self, train=own, held_out=own, healthy=None, remarks=(), openings=None)
 
 
 def prepare(study: Study) -> Data:
@@ -110,8 +110,9 @@ def prepare(study: Study) -> Data:
     dt = tables["train"][0].dt
     horizon = max(round(file.horizon / dt) if file.horizon else _usual(tables, dt), 2)
     groups: dict[str, list[Columns]] = _with_known(study, tables)
-    groups["held_out"], groups["telling"], told = divided(study, groups["held_out"], horizon)
-    remarks += told
+    held_out = without_openings(study, groups["held_out"], horizon)
+    groups["held_out"], groups["openings"], more = held_out
+    remarks += more
     made = {
         use: _recording(study, group, horizon, use, remarks) if group else None
         for use, group in groups.items()
@@ -127,7 +128,7 @@ def prepare(study: Study) -> Data:
     if any(INVENTED in remark for remark in remarks):
         altered.append("inputs are missing")
     unlike = tuple(dict.fromkeys(altered))
-    return Data(*uses, horizon, tuple(remarks), telling=made["telling"], altered=unlike)
+    return Data(*uses, horizon, tuple(remarks), openings=made["openings"], altered=unlike)
 
 
 def _usual(tables: Mapping[str, Sequence[Columns]], dt: float) -> int:
@@ -193,7 +194,7 @@ def _recording(
     thinning = Thinning(thin.factor, thin.edge, parts) if thin else None
     u, y = np.concatenate(inputs), np.concatenate(outputs)
     u, y = _without_holes(study.model, u, y, horizon, use=use, remarks=remarks)
-    if use != "telling":
+    if use != "openings":
         _check_excitation(study.model, u, use)
     ends = [name for name, held in study.holds.items() if held.ends]
     passed = min(table.passed for table in tables)

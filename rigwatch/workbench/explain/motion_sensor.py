@@ -135,8 +135,8 @@ def _corrected_data(
     train, held_out = (
         corrected(r, sensor, direction, strength) for r in (data.train, data.held_out)
     )
-    telling = data.telling and corrected(data.telling, sensor, direction, strength)
-    return replace(data, train=train, held_out=held_out, telling=telling)
+    openings = data.openings and corrected(data.openings, sensor, direction, strength)
+    return replace(data, train=train, held_out=held_out, openings=openings)
 
 
 def corrected(

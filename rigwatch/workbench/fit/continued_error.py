@@ -7,7 +7,7 @@ different effects can be compared only if such states are continued, as on held-
 
 from rigwatch.physics.engine.fit import evaluate
 from rigwatch.workbench.data import Data
-from rigwatch.workbench.fit.fitted import Fitted, overall
+from rigwatch.workbench.fit.fitted import Fitted, overall_error
 
 
 def continued_train_error(fitted: Fitted, data: Data) -> float:
@@ -22,4 +22,4 @@ def continued_train_error(fitted: Fitted, data: Data) -> float:
     judged = evaluate(
         train, data.train, fitted.horizon, fitted.substeps, train.initial, judging=True
     )
-    return overall(judged)
+    return overall_error(judged)

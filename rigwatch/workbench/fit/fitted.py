@@ -6,12 +6,8 @@ import numpy as np
 
 from rigwatch.physics.engine.compile import CompiledSystem
 from rigwatch.physics.engine.equations import Placement
-from rigwatch.physics.engine.fit import (
-    Fit,
-)
-from rigwatch.physics.engine.search import (
-    Convergence,
-)
+from rigwatch.physics.engine.fit import Fit
+from rigwatch.physics.engine.search import Convergence
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.workbench.study import NOISES, told, told_unit
 
@@ -48,19 +44,15 @@ class Fitted:
         """The compiled system."""
         return self.train.compiled
 
-    def errors(self, fitted: Fit) -> float:
-        """Training and held-out error over all channels, see `overall`."""
-        return overall(fitted)
-
     @property
     def train_error(self) -> float:
         """Overall error on the training recordings."""
-        return overall(self.train)
+        return overall_error(self.train)
 
     @property
     def held_out_error(self) -> float:
         """Overall error on the recordings held out."""
-        return overall(self.held_out)
+        return overall_error(self.held_out)
 
     @property
     def error_unit(self) -> str:
@@ -80,7 +72,7 @@ class Fitted:
         return told(self.held_out_error, self.told_in)
 
 
-def overall(fitted: Fit) -> float:
+def overall_error(fitted: Fit) -> float:
     """Error over all channels: in the channel's unit if there is only one, else over its noise."""
     if len(fitted.scale) == 1:
         return float(fitted.rms[0])

@@ -23,7 +23,7 @@ from rigwatch.physics.engine.fit import (
     initial_states,
     untied,
     windows,
-    with_told,
+    with_opening_values,
 )
 from rigwatch.physics.engine.search import (
     Convergence,
@@ -194,7 +194,9 @@ def values_with(
         ModelError: an effect does not fit its port, or the simulation diverged (NaN or infinite).
     """
     found, _, _ = _trained(study, data, placements, start, scale)
-    return with_told(found, study.model, data.telling, data.horizon, study.file.substeps).values()
+    return with_opening_values(
+        found, study.model, data.openings, data.horizon, study.file.substeps
+    ).values()
 
 
 def _trained(  # noqa: PLR0917 -- the arguments of `fit_model`
@@ -279,7 +281,7 @@ def _judged(  # noqa: PLR0917 -- they belong together
     """A fit with its held-out error."""
     length = data.horizon if study.model.states else len(data.held_out)
     substeps = study.file.substeps
-    found = with_told(found, study.model, data.telling, data.horizon, substeps)
+    found = with_opening_values(found, study.model, data.openings, data.horizon, substeps)
     # Along the motion hidden states follow it; a rough model is judged with its reference.
     judging = not (data.along_motion or study.model.rough)
     further = {"steps": TO_THE_END} if data.along_motion else {}

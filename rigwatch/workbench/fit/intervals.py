@@ -35,7 +35,7 @@ FARTHEST = 1e70
 variances stay finite."""
 PHASES = 20
 """Number of parts of one repetition, each a block."""
-TOLD = "told by the first samples of a held-out recording"
+OF_OPENING = "from the first samples of a held-out recording"
 TIED = 0.98
 """Correlation above which two parameters count as tied."""
 
@@ -183,8 +183,8 @@ def values(fitted: Fit, added_variances: Mapping[str, float] | None = None) -> d
     for name, value in fitted.values().items():
         interval = (value - spread[name], value + spread[name]) if name in spread else None
         parameter = system.parameters[name]
-        told = TOLD if parameter.is_told else ""
-        found[name] = Value(value, parameter.unit, interval, notes.get(name, told))
+        otherwise = OF_OPENING if parameter.is_of_opening else ""
+        found[name] = Value(value, parameter.unit, interval, notes.get(name, otherwise))
     return found
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from rigwatch.physics.engine.compile import CompiledSystem, compile_system
 from rigwatch.physics.engine.equations import Model, compose
-from rigwatch.physics.engine.fit import Fit, Recording, bounds, evaluate, with_told
+from rigwatch.physics.engine.fit import Fit, Recording, bounds, evaluate, with_opening_values
 from rigwatch.physics.engine.search import Convergence, WholeRuns, multi_start_fit
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.data import Data, quiet_scale
@@ -45,7 +45,7 @@ def fit_whole(
     compiled = compile_system(compose(model))
     own = {name: value for name, value in start.items() if name in model.parameters}
     fit, ended = _fit_until_converged(study, compiled, data.train, compiled.vector(own), searches)
-    fit = with_told(fit, model, data.telling, len(data.train), study.file.substeps)
+    fit = with_opening_values(fit, model, data.openings, len(data.train), study.file.substeps)
     judged = evaluate(fit, data.held_out, len(data.held_out), study.file.substeps)
     return Fitted((), fit, judged, study.file.substeps, len(data.train), None, ended)
 

@@ -14,9 +14,16 @@ from rigwatch.workbench.steps.model_handover import (
     rehearse,
     restore,
 )
-from rigwatch.workbench.steps.model_steps import Signals, Stage, signals, stages
 from rigwatch.workbench.steps.promotion import promotion
-from rigwatch.workbench.steps.trial import Change, Trial, try_add, try_effect, try_undo, whole
+from rigwatch.workbench.steps.study_stages import Signals, Stage, signals, stages
+from rigwatch.workbench.steps.trial import (
+    Change,
+    Trial,
+    accepted_with_model,
+    try_add,
+    try_effect,
+    try_undo,
+)
 
 __all__ = [
     "Change",
@@ -26,6 +33,7 @@ __all__ = [
     "Signals",
     "Stage",
     "Trial",
+    "accepted_with_model",
     "add",
     "change",
     "check_effect",
@@ -46,5 +54,4 @@ __all__ = [
     "try_effect",
     "try_undo",
     "undo",
-    "whole",
 ]

@@ -4,7 +4,7 @@ Logs are imported as sessions in the study's folder and columns are matched to t
 The study file records the choices: training and held-out parts, sample rate, low-pass.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from rigwatch.wire.units import is_unit, unit_of
 from rigwatch.workbench.data import (
     RATES_ALIKE,
     UNFILLED,
+    Columns,
     Part,
     prepare,
     proposed_low_pass,
@@ -82,20 +83,8 @@ def _file(files: NewFiles, logs: Logs, model: Model, reading: Matched) -> tuple[
         written = ", ".join(f'{name} = "{unit}"' for name, unit in units.items())
         lines.append(f"shown = {{ {written} }}  # the logs' units")
     if reading.rates:
-        sources = sorted({channel for channel, _ in reading.rates.values()})
-        low_pass = max(proposed_low_pass(tables, name) for name in sources)
-        lines += ["", "[derive]", f"low_pass = {low_pass!r}"]
-        lines += [
-            f'signals.{name} = {{ channel = "{channel}", order = {order} }}'
-            for name, (channel, order) in reading.rates.items()
-        ]
-        choices.append(f"{', '.join(reading.rates)} made from {', '.join(sources)}, low-passed at"
-                    f" {low_pass:g} Hz")  # fmt: skip
-        factor = int(min(rates) / (SAMPLES_PER_PERIOD * low_pass))
-        enough = min(map(len, tables)) >= FEWEST * factor
-        if factor > 1 and enough and not model.states:
-            lines += ["", "[thin]", f"factor = {factor}", f"edge = {EDGE}"]
-            choices.append(f"residuals low-passed alike: every {factor}th sample counts")
+        added, more = _derive_section(reading, model, tables)
+        lines, choices = [*lines, *added], [*choices, *more]
     for use, parts in (("train", train), ("held_out", held_out)):
         for part in parts:
             lines += _span(use, logs.data[part.recording].stem, part, logs)
@@ -104,14 +93,42 @@ def _file(files: NewFiles, logs: Logs, model: Model, reading: Matched) -> tuple[
             choices.append(f"{use.replace('_', ' ')}: {_in_words(logs, part)}{never}")
     for path in logs.healthy:
         lines += _span("healthy", path.stem, Part(0), logs)
+    return "\n".join(lines) + "\n", [*choices, *_not_fitted(logs, model)]
+
+
+def _derive_section(
+    reading: Matched, model: Model, tables: Sequence[Columns]
+) -> tuple[list[str], list[str]]:
+    """Lines on the signals that are derived from others, and remarks on them."""
+    sources = sorted({channel for channel, _ in reading.rates.values()})
+    low_pass = max(proposed_low_pass(tables, name) for name in sources)
+    lines = ["", "[derive]", f"low_pass = {low_pass!r}"]
+    lines += [
+        f'signals.{name} = {{ channel = "{channel}", order = {order} }}'
+        for name, (channel, order) in reading.rates.items()
+    ]
+    choices = [
+        f"{', '.join(reading.rates)} made from {', '.join(sources)}, low-passed at {low_pass:g} Hz"
+    ]
+    lowest_rate = 1 / max(table.dt for table in tables)
+    factor = int(lowest_rate / (SAMPLES_PER_PERIOD * low_pass))
+    enough = min(map(len, tables)) >= FEWEST * factor
+    if factor > 1 and enough and not model.states:
+        lines += ["", "[thin]", f"factor = {factor}", f"edge = {EDGE}"]
+        choices.append(f"residuals low-passed alike: every {factor}th sample counts")
+    return lines, choices
+
+
+def _not_fitted(logs: Logs, model: Model) -> list[str]:
+    """A remark on the fixed parameters that keep the model file's values, if there are any."""
     given = {*logs.start, *(name for values in logs.known.values() for name in values)}
-    known = [n for n, p in model.parameters.items() if p.fixed and n not in given]
-    if known:
-        choices.append(
-            f"{', '.join(known)}: not fitted, taken from the model file; set known values with"
-            f" --set {known[0]}=VALUE"
-        )
-    return "\n".join(lines) + "\n", choices
+    fixed = [n for n, p in model.parameters.items() if p.fixed and n not in given]
+    if not fixed:
+        return []
+    return [
+        f"{', '.join(fixed)}: not fitted, taken from the model file; set known values with"
+        f" --set {fixed[0]}=VALUE"
+    ]
 
 
 def _of_log(model: Model, columns: Mapping[str, str]) -> dict[str, str]:

@@ -55,7 +55,7 @@ def replay(study: Study, progress: Callable[[str], None] = lambda _: None) -> li
 
 
 def _check(study: Study, line: dict[str, Any], effects: list[Accepted]) -> Check:
-    model = Study(
+    then = Study(
         study.folder,
         replace(study.file, effects=tuple(effects)),
         study.model,
@@ -63,7 +63,7 @@ def _check(study: Study, line: dict[str, Any], effects: list[Accepted]) -> Check
         study.own,
         holds=study.holds,
     )
-    found = comparison(open_bench(model)).held_out_error
+    found = comparison(open_bench(then)).held_out_error
     recorded = float(line["held_out_error"])
     same = abs(found / recorded - 1) < SAME
     label = f"{line['step']} {line['effect']}@{line['port']}"

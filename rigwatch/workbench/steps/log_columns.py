@@ -59,38 +59,66 @@ def matched(
     time = None if when else _time_of(headers, dated, model, counted=counted)
     free = [h for h in headers if h is not time and not when.startswith(h.column)]
     signals: dict[str, Input | Output] = {**model.inputs, **model.outputs}
-    found, remarks = dict(given), list[str]()
-    missing = dict[str, Input | Output]()
+    found, missing, remarks = _read(signals, given, headers, free)
+    rates = _derived(signals, missing, columns)
+    if time is not None:
+        when, more = _as_time(time, dated)
+        remarks += more
+    return Matched(found, when, rates, tuple(remarks))
+
+
+def _read(
+    signals: Mapping[str, Input | Output],
+    given: Mapping[str, str],
+    headers: Sequence[Header],
+    free: list[Header],
+) -> tuple[dict[str, str], list[str], list[str]]:
+    """Columns by channel, names of the signals without one, and remarks.
+
+    Args:
+        signals: of the model.
+        given: mapping given by the user.
+        headers: of all columns.
+        free: those that no signal has yet; the ones taken are removed.
+    """
+    found, missing, remarks = dict(given), list[str](), list[str]()
     for name, signal in signals.items():
         channel = signal.channel or name
         if channel in found:
             found[channel], told = _given(found[channel], channel, signal, headers)
-            remarks += told
+        elif column := _column(name, channel, signal, free):
+            unit, told = _unit(column, channel, signal)
+            found[channel] = f"{column.column}[{unit}]"
+            free.remove(column)
+        else:
+            missing.append(name)
             continue
-        column = _column(name, channel, signal, free)
-        if column is None:
-            missing[name] = signal
-            continue
-        unit, told = _unit(column, channel, signal)
-        found[channel] = f"{column.column}[{unit}]"
-        free.remove(column)
         remarks += told
+    return found, missing, remarks
+
+
+def _derived(
+    signals: Mapping[str, Input | Output], missing: Sequence[str], columns: Sequence[str]
+) -> dict[str, tuple[str, int]]:
+    """The source channel and the number of differentiations of each signal without a column."""
     measured = {s.channel or name: s for name, s in signals.items() if name not in missing}
     rates = dict[str, tuple[str, int]]()
-    for name, signal in missing.items():
-        channel = signal.channel or name
-        made = _rate(signal, measured)
+    for name in missing:
+        channel, made = signals[name].channel or name, _rate(signals[name], measured)
         if made is None:
-            raise ModelError(_unknown(name, channel, signal, columns))
+            raise ModelError(_unknown(name, channel, signals[name], columns))
         rates[channel] = made
-    if time is not None and not time.units and time.column not in dated:
-        remarks.append(
-            f"{time.column}: no unit in its header, assumed s; for ms give --time"
-            f" '{time.column}[ms]'"
-        )
-    if time is not None:
-        when = f"{time.column}[{'s' if time.column in dated else _time_unit(time)}]"
-    return Matched(found, when, rates, tuple(remarks))
+    return rates
+
+
+def _as_time(time: Header, dated: Collection[str]) -> tuple[str, list[str]]:
+    """The time's "column[unit]", and a remark if the unit is assumed."""
+    if time.column in dated:
+        return f"{time.column}[s]", []
+    assumed = (
+        f"{time.column}: no unit in its header, assumed s; for ms give --time '{time.column}[ms]'"
+    )
+    return f"{time.column}[{_time_unit(time)}]", [] if time.units else [assumed]
 
 
 def _time_of(

@@ -106,9 +106,9 @@ def restore(rig: Path) -> ModelHandover:
         ConfigError: the rig's configuration cannot be read, or there is no previous model.
     """
     user = operator_name(load_rig(rig).bus, "")
-    wish = ModelRequest("rollback", "", user, "rolled back from the rig's page")
-    granted, live = _send(rig, model_path(rig), wish, lambda _: None)
-    return ModelHandover(granted, live, None)
+    request = ModelRequest("rollback", "", user, "rolled back from the rig's page")
+    reply, live = _send(rig, model_path(rig), request, lambda _: None)
+    return ModelHandover(reply, live, None)
 
 
 def model_path(rig: Path) -> Path:

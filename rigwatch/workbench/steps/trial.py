@@ -128,7 +128,7 @@ def try_add(
     supported = row.accepted or (in_set is not None and not in_set.reason)
     if not (supported or anyway):
         return _refused(study, row, before, f"{_falls(row, before, found)}: {row.reason}")
-    accepted = whole(row)
+    accepted = accepted_with_model(row)
     progress(f"refitting with {row.label}")
     changed = with_kept_holds(study, accepted, bench, warm)
     after = warm.comparison(changed)
@@ -252,8 +252,8 @@ def try_effect(
     return warm.get((effect, where, stands_on(study)), lambda: _tried(bench, effect, where))
 
 
-def whole(row: Ranked) -> Accepted:
-    """The effect as an entry of the study's file, with all values fitted with it."""
+def accepted_with_model(row: Ranked) -> Accepted:
+    """The effect as an entry of the study's file, with the model's values fitted beside it."""
     assert row.fitted is not None
     own, fit = accepted_from(row), row.fitted.train
     free = set(fit.compiled.system.free)

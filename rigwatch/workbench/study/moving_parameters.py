@@ -6,7 +6,8 @@ A parameter `p` with `per_recording = true` becomes one parameter per session an
 
 in which the held input `in_run1` is 1 in the session run1 and 0 elsewhere. Parts of one session
 share a value. A session of which no part is fitted has a fixed parameter instead, since data that
-judge may not fit: its value is told by samples that do not count (`Data.telling`).
+judge may not fit: its value is fitted to its opening, which does not count
+(`Data.openings`).
 """
 
 import re

@@ -69,7 +69,8 @@ def test_a_step_that_gets_worse_when_it_is_fitted_again_is_refused(
     study: Study, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # As if the file could not keep the fit: it begins at the model file's values again.
-    monkeypatch.setattr("rigwatch.workbench.steps.trial.whole", accepted_from)
+    keeps = "rigwatch.workbench.steps.trial.accepted_with_model"
+    monkeypatch.setattr(keeps, accepted_from)
     before = (study.folder / "study.toml").read_bytes()
     change = add(study, "constant_force")
     assert change.step == "refused"

@@ -82,7 +82,7 @@ def test_a_tilt_that_moves_is_fitted_per_recording_and_friction_is_named(tmp_pat
     assert found.ranking[0].parameters["Fc"].value == pytest.approx(1.5, abs=0.1)
 
 
-def test_the_values_of_held_out_recordings_are_told_by_samples_that_do_not_count(
+def test_the_values_of_held_out_recordings_are_from_openings_that_do_not_count(
     tmp_path: Path,
 ) -> None:
     study = create(tmp_path / "study", sled(tmp_path, friction=0.0))
@@ -92,10 +92,10 @@ def test_the_values_of_held_out_recordings_are_told_by_samples_that_do_not_count
         assert values[f"tilt_{name}"] == pytest.approx(tilt, abs=0.1)
     assert "tilt_b" not in bench.base.compiled.system.free
     assert bench.base.held_out_error < 1.2 * NOISE
-    assert bench.data.telling is not None
-    assert len(bench.data.telling) % (2 * bench.data.horizon) == 0
-    assert len(bench.data.telling) + len(bench.data.held_out) <= 4000
-    assert any("tell what moves" in remark for remark in bench.data.remarks)
+    assert bench.data.openings is not None
+    assert len(bench.data.openings) % (2 * bench.data.horizon) == 0
+    assert len(bench.data.openings) + len(bench.data.held_out) <= 4000
+    assert any("determine what moves" in remark for remark in bench.data.remarks)
 
 
 def test_without_the_key_the_fit_is_bad(tmp_path: Path) -> None:
@@ -104,7 +104,7 @@ def test_without_the_key_the_fit_is_bad(tmp_path: Path) -> None:
     assert bench.base.held_out_error > 5 * NOISE
 
 
-def test_counted_samples_do_not_move_what_is_told(tmp_path: Path) -> None:
+def test_counted_samples_do_not_move_what_the_opening_determines(tmp_path: Path) -> None:
     """A held-out recording whose tilt changes after its first part is judged badly."""
     (tmp_path / "model.toml").write_text(SLED)
     text = 'model = "model.toml"\n'
@@ -148,7 +148,7 @@ def test_parts_of_one_session_share_a_value(tmp_path: Path) -> None:
     text += '[[held_out]]\nsession = "a.mcap"\nstart = 14.0\n'
     template.write_text(text)
     bench = open_bench(create(tmp_path / "study", template))
-    assert bench.data.telling is None
+    assert bench.data.openings is None
     assert bench.base.held_out_error < 1.2 * NOISE
 
 

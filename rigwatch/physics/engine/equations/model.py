@@ -98,8 +98,8 @@ class Parameter(Section, frozen=True, kw_only=True):
     shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
 
     @property
-    def is_told(self) -> bool:
-        """Whether the study gives its value for each recording."""
+    def is_of_opening(self) -> bool:
+        """Whether it belongs to one recording and is fitted to its opening, not to what counts."""
         return self.per_recording and self.fixed
 
     def __post_init__(self) -> None:

@@ -10,6 +10,7 @@ from rigwatch.physics.engine.fit.measured_recording import (
     motion_recording,
     motion_widths,
 )
+from rigwatch.physics.engine.fit.opening_values import with_opening_values
 from rigwatch.physics.engine.fit.port_signals import port_signals
 from rigwatch.physics.engine.fit.problem import Problem
 from rigwatch.physics.engine.fit.recorded_effect_states import RecordedEffectStates
@@ -23,7 +24,6 @@ from rigwatch.physics.engine.fit.recording import (
     windows,
 )
 from rigwatch.physics.engine.fit.ties import untied
-from rigwatch.physics.engine.fit.told_parameters import with_told
 from rigwatch.physics.engine.fit.windowed_fit import (
     Fit,
     bounds,
@@ -56,5 +56,5 @@ __all__ = [
     "shown_states",
     "untied",
     "windows",
-    "with_told",
+    "with_opening_values",
 ]

@@ -1,4 +1,4 @@
-"""Parameters of held-out recordings, told by samples that do not count.
+"""Values of a held-out recording's own parameters, from its opening, which does not count.
 
 A parameter with `per_recording` is fixed for a recording of which no part is fitted. Its value is
 fitted to the recording's first part, with all other parameters at their fitted values, so it
@@ -16,29 +16,29 @@ from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.physics.engine.fit.windowed_fit import Fit, fit
 
 
-def with_told(
-    found: Fit, model: Model, telling: Recording | None, horizon: int, substeps: int
+def with_opening_values(
+    found: Fit, model: Model, openings: Recording | None, horizon: int, substeps: int
 ) -> Fit:
-    """A fit with the parameters of held-out recordings told by their first samples.
+    """A fit with the own parameters of held-out recordings, fitted to their openings.
 
     Args:
         found: the fit.
         model: of the study.
-        telling: the first parts of held-out recordings; None if nothing has to be told.
+        openings: the first parts of held-out recordings; None if no parameter depends on them.
         horizon: samples of a window.
         substeps: Runge-Kutta steps between samples for non-stiff systems.
 
     Raises:
         ModelError: the simulation diverges.
     """
-    told = [n for n, p in model.parameters.items() if p.is_told]
-    if telling is None or not told:
+    own = [n for n, p in model.parameters.items() if p.is_of_opening]
+    if openings is None or not own:
         return found
     system = found.compiled.system
-    loose = {n: structs.replace(p, fixed=n not in told) for n, p in system.parameters.items()}
+    loose = {n: structs.replace(p, fixed=n not in own) for n, p in system.parameters.items()}
     compiled = compile_system(replace(system, parameters=loose))
     at = fit(
-        compiled, telling, horizon, start=found.parameters, scale=found.scale, substeps=substeps
+        compiled, openings, horizon, start=found.parameters, scale=found.scale, substeps=substeps
     )
-    parameters = np.where([n in told for n in system.parameters], at.parameters, found.parameters)
+    parameters = np.where([n in own for n in system.parameters], at.parameters, found.parameters)
     return replace(found, parameters=parameters)

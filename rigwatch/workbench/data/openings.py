@@ -1,8 +1,8 @@
-"""First samples of held-out recordings, which tell parameters that move between recordings.
+"""Openings of held-out recordings, which determine parameters that move between recordings.
 
 A parameter with `per_recording` has a value of its own in a recording that is held out. If counted
-samples determined it, it would be a free constant for every effect alike. The first part of such a
-recording tells it instead and is not counted.
+samples determined it, it would be a free constant for every effect alike. The opening of such a
+recording, its first part, determines it instead and is not counted.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,34 +12,34 @@ from rigwatch.workbench.data.columns import Columns
 from rigwatch.workbench.study import Span, Study, judged_alone
 
 LEAD = 0.1
-"""Share of a held-out recording that tells its own parameters."""
+"""Share of a held-out recording that is its opening."""
 
 
-def divided(
+def without_openings(
     study: Study, tables: Sequence[Columns], horizon: int
 ) -> tuple[list[Columns], list[Columns], list[str]]:
-    """Held-out recordings without what tells their own parameters, what tells them, and remarks.
+    """Held-out recordings without their openings, the openings, and remarks.
 
     Args:
         study: its model has a fixed parameter for each held-out session of which no part is fitted.
         tables: the held-out recordings.
-        horizon: samples of a window; a model with states is told over whole windows.
+        horizon: samples of a window; an opening of a model with states is whole windows.
     """
-    moving = [n for n, p in study.model.parameters.items() if p.is_told]
+    moving = [n for n, p in study.model.parameters.items() if p.is_of_opening]
     spans = study.file.held_out
     if not moving:
         return list(tables), [], []
-    counted, telling, remarks = [], [], []
+    counted, openings, remarks = [], [], []
     for table, span, first in zip(tables, spans, _first_parts(study, spans), strict=True):
         lead = _lead(len(table), horizon if study.model.states else 1) if first else 0
         counted.append(_part(table, slice(lead, None)))
         if lead:
-            telling.append(_part(table, slice(lead)))
+            openings.append(_part(table, slice(lead)))
             remarks.append(
-                f"held out: the first {lead * table.dt:.3g} s of {span.session} tell what moves"
-                " between recordings and are not counted"
+                f"held out: the first {lead * table.dt:.3g} s of {span.session} determine what"
+                " moves between recordings and are not counted"
             )
-    return counted, telling, remarks
+    return counted, openings, remarks
 
 
 def _first_parts(study: Study, spans: Sequence[Span]) -> Iterator[bool]:
@@ -51,7 +51,7 @@ def _first_parts(study: Study, spans: Sequence[Span]) -> Iterator[bool]:
 
 
 def _lead(samples: int, step: int) -> int:
-    """Samples that tell: whole windows, and fewer than the recording has."""
+    """Samples of an opening: whole windows, and fewer than the recording has."""
     wanted = -(-max(round(LEAD * samples), 2) // step) * step
     return min(wanted, (samples - 1) // step * step)
 
