@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from benchmarks.explaining.hidden_effects import RIGHT, SAMPLES, explained
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.experiment.next_experiment import excitation
-from rigwatch.workbench.explain.explain import explanation
+from rigwatch.workbench.explain.explanation import explanation
 from sim_plant.oscillator import RATE, Hidden, strength_for
 from tests.workbench.simulated import HORIZON, recorded, size_of, study
 from tools.benchmark_table import Row

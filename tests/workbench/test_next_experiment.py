@@ -6,7 +6,8 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare.preparation import Bench, bench_of
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.experiment.next_experiment import excitation
-from rigwatch.workbench.explain.explain import explanation, ranking
+from rigwatch.workbench.explain.explain import ranking
+from rigwatch.workbench.explain.explanation import explanation
 from sim_plant.oscillator import RATE, Hidden, strength_for
 from tests.workbench.simulated import HORIZON, recorded, size_of, study
 

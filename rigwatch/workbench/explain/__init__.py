@@ -3,17 +3,9 @@
 compare ──▶ rank ──▶ pairs ──▶ verdict (calibrated) ──▶ next experiment, where undetermined
 """
 
-from rigwatch.workbench.explain.explain import (
-    Explained,
-    Explanation,
-    Row,
-    as_data,
-    explain,
-    explained,
-    explanation,
-    ranking,
-)
-from rigwatch.workbench.explain.set_gain import SetGain, set_gain
+from rigwatch.workbench.explain.explain import Explained, explain, explained, ranking
+from rigwatch.workbench.explain.explanation import Explanation, Row, as_data, explanation
+from rigwatch.workbench.explain.sets.set_gain import SetGain, set_gain
 from rigwatch.workbench.explain.verdict import Verdict, judge
 
 __all__ = [

@@ -2,8 +2,8 @@
 
 import pytest
 
-from rigwatch.workbench.explain.combinations import Combination
-from rigwatch.workbench.explain.several_effects import _doubted
+from rigwatch.workbench.explain.sets.combinations import Combination
+from rigwatch.workbench.explain.sets.several_effects import _doubted
 from rigwatch.workbench.explain.verdict import judge
 from rigwatch.workbench.ranking import Ranked
 from tests.workbench.verdicts.test_judge import PERIODS, base, row

@@ -7,7 +7,8 @@ import pytest
 
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.workbench.data.signals import MotionSensor
-from rigwatch.workbench.explain.explain import explanation, ranking
+from rigwatch.workbench.explain.explain import ranking
+from rigwatch.workbench.explain.explanation import explanation
 from rigwatch.workbench.explain.motion_sensor import DIRECTIONS, corrected
 from rigwatch.workbench.report.text_report import doubt_of
 from tests.workbench.rigs import test_foreign_rig as rig

@@ -7,7 +7,7 @@ import pytest
 
 from rigwatch.physics.engine.compile import all_cores, turns
 from rigwatch.workbench.explain.explain import _by_pairs, ranking
-from rigwatch.workbench.explain.pairs import Pair, _pair, likely_pairs, two_effects
+from rigwatch.workbench.explain.sets.pairs import Pair, _pair, likely_pairs, two_effects
 from rigwatch.workbench.explain.verdict import judge
 from rigwatch.workbench.ranking import refitting
 from rigwatch.workbench.ranking.rank import rank

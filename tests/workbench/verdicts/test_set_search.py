@@ -9,13 +9,13 @@ import pytest
 
 from rigwatch.physics.engine.equations.system import Placement
 from rigwatch.workbench.compare import open_bench
-from rigwatch.workbench.explain.combinations import (
+from rigwatch.workbench.explain.sets.combinations import (
     Combination,
     _best_in_training,
     _substitutes,
     with_rows,
 )
-from rigwatch.workbench.explain.several_effects import _judge_each, _ranked_with
+from rigwatch.workbench.explain.sets.several_effects import _judge_each, _ranked_with
 from rigwatch.workbench.ranking import candidates, no_progress, rank, refit, scored
 from rigwatch.workbench.ranking.rank import _substitute_of_vague, _unfitted_similar
 from rigwatch.workbench.ranking.ranked import Ranked

@@ -8,7 +8,7 @@ import pytest
 from rigwatch.physics.engine.equations.model import model_text
 from rigwatch.workbench.compare import open_bench
 from rigwatch.workbench.explain.explain import ranking
-from rigwatch.workbench.explain.several_effects import several_effects
+from rigwatch.workbench.explain.sets.several_effects import several_effects
 from rigwatch.workbench.explain.verdict import judge
 from rigwatch.workbench.ranking.rank import rank
 from rigwatch.workbench.ranking.refitting import no_progress

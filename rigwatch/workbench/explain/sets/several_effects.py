@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.data import NoiseFloor
-from rigwatch.workbench.explain.combinations import (
+from rigwatch.workbench.explain.sets.combinations import (
     UNLIMITED,
     Combination,
     combinations,

@@ -1,0 +1,171 @@
+"""What an explanation says: verdict, ranking with strengths, how often such verdicts were wrong."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from rigwatch.workbench.compare import Bench, Comparison, added_variances, comparison, unweighed
+from rigwatch.workbench.experiment import Experiment, propose
+from rigwatch.workbench.explain.adequacy import uncalibrated
+from rigwatch.workbench.explain.exchange import Exchange
+from rigwatch.workbench.explain.verdict import Verdict
+from rigwatch.workbench.explain.verdict_calibration import (
+    LATER_COUNTS,
+    cases_seen,
+    cases_seen_along,
+    later_probability_wrong,
+    most_probably_wrong,
+    probability_wrong_along,
+)
+from rigwatch.workbench.fit import Value, as_written, values
+from rigwatch.workbench.ranking import Ranked
+
+STRENGTH_TOLD = ("missing_effect", "undetermined")
+"""Verdicts of whose best effect the strength has its full uncertainty; fitting it takes time."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One effect of the ranking.
+
+    Attributes:
+        effect, port: names of the effect and its port.
+        train_error, held_out_error: with the effect in the model, None if not fitted.
+        p_value: corrected for the number of candidates.
+        class_: effects indistinguishable from it on this recording, as "effect@port".
+        parameters: the effect's own, by name.
+        accepted: whether the held-out error falls by more than chance.
+        reason: why it is accepted, refused or not fitted, in words.
+    """
+
+    effect: str
+    port: str
+    train_error: float | None
+    held_out_error: float | None
+    p_value: float
+    class_: list[str]
+    parameters: dict[str, Value]
+    accepted: bool
+    reason: str
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Result of explaining a study.
+
+    Attributes:
+        verdict: nothing_missing, missing_effect, undetermined, unknown_effect or model_inadequate.
+        text: the verdict in a sentence.
+        comparison: the current model against the recordings.
+        ranking: best first.
+        rivals: effects of different physics that the recording cannot distinguish from the best.
+        also: second missing effect, if two are missing at once.
+        next_experiment: an excitation that separates the rivals; None if there are none, or if
+            none is found.
+        wrong_probability: probability that the verdict is wrong, calibrated on simulated cases;
+            None if a later step is judged along the measured motion, or if too few cases were like
+            it.
+        like_this: number of simulated cases with a similar verdict, and how many were wrong.
+        beside: the other effects of the set that the named effect was judged in; with them `add`
+            accepts it if it is refused alone.
+        error_unit: SI unit of the errors in `ranking`; `text` tells them in that of the
+            comparison's `told_in`.
+        wrong_at_most: upper bound of that probability, 95 %; None as above.
+        unlike: why no simulated case is like this one, in words; empty if some are.
+        exchange: an effect that describes the last accepted one better, if nothing beside it
+            explains the error; None if none does, or if that was not asked.
+    """
+
+    verdict: str
+    text: str
+    comparison: Comparison
+    ranking: list[Row]
+    rivals: list[str] = field(default_factory=list)
+    also: list[str] = field(default_factory=list)
+    next_experiment: Experiment | None = None
+    wrong_probability: float | None = 0.5
+    like_this: tuple[int, int] = (0, 0)
+    beside: list[str] = field(default_factory=list)
+    error_unit: str = ""
+    exchange: Exchange | None = None
+    wrong_at_most: float | None = None
+    unlike: str = ""
+
+
+def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanation:
+    """Converts a ranking and a verdict to the result shown to users and programs."""
+    members, rivals = [*verdict.members, *verdict.rivals], list(verdict.rivals)
+    experiment = None
+    # Excitations are compared by simulating the motion; a model along the measured motion cannot.
+    if verdict.best is not None and rivals and not bench.data.along_motion:
+        experiment = propose(bench, verdict.best, [row for row in rows if row.label in rivals])
+    more: dict[str, float] = {}
+    compared = comparison(bench)
+    named = verdict.word in STRENGTH_TOLD
+    if named and verdict.best is not None and verdict.best.fitted is not None:
+        more = added_variances(bench.study, bench.data, bench.bare, verdict.best.fitted)
+        told = unweighed(bench, verdict.best.placement, verdict.best.fitted, more)
+        compared = replace(compared, remarks=[*compared.remarks, *told])
+    listed = [
+        _row(row, members, more) if row is verdict.best else _row(row, row.alike) for row in rows
+    ]
+    unlike = "; ".join(uncalibrated(bench))
+    probability, similar = _reliability(bench, verdict)
+    most = None if unlike else most_probably_wrong(*similar)
+    return Explanation(
+        verdict.word,
+        verdict.text,
+        compared,
+        listed,
+        rivals,
+        list(verdict.second),
+        experiment,
+        None if unlike or (similar[0] and most is None) else probability,
+        similar,
+        list(verdict.beside),
+        compared.unit,
+        wrong_at_most=most,
+        unlike=unlike,
+    )
+
+
+def _reliability(bench: Bench, verdict: Verdict) -> tuple[float | None, tuple[int, int]]:
+    """Probability that the verdict is wrong, and how many similar cases were, of how many."""
+    later, rough = bool(bench.study.file.effects), bench.study.model.rough
+    if bench.data.along_motion and later:
+        return None, (0, 0)
+    if bench.data.along_motion:
+        counted = cases_seen_along(verdict.word, rough=rough)
+        return probability_wrong_along(verdict.word, rough=rough), counted
+    if later:
+        return later_probability_wrong(), LATER_COUNTS
+    return verdict.probability_wrong, cases_seen(verdict.word, verdict.evidence)
+
+
+def _row(row: Ranked, alike: list[str], more: Mapping[str, float] | None = None) -> Row:
+    found: dict[str, Value] = {}
+    if row.fitted is not None:
+        prefix = row.placement.prefix
+        every = as_written(values(row.fitted.train, more), row.fitted.compiled.system)
+        found = {n[len(prefix) :]: v for n, v in every.items() if n.startswith(prefix)}
+    others = [label for label in alike if label != row.label]
+    return Row(
+        row.effect,
+        row.port,
+        row.fitted.train_error if row.fitted else None,
+        row.fitted.held_out_error if row.fitted else None,
+        row.p_value,
+        others,
+        found,
+        row.accepted,
+        row.reason,
+    )
+
+
+def as_data(found: Explanation) -> dict[str, object]:
+    """The result as plain data, as printed by `rigwatch explain --json`."""
+    ranking = [
+        {name.rstrip("_"): getattr(row, name) for name in row.__dataclass_fields__}
+        for row in found.ranking
+    ]
+    whole = {name: getattr(found, name) for name in found.__dataclass_fields__}
+    return whole | {"ranking": ranking}

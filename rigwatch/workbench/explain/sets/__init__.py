@@ -1,0 +1,1 @@
+"""Several effects at once: pairs along the measured motion, sets of up to three in free runs."""
