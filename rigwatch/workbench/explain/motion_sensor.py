@@ -22,7 +22,8 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.data import Data, MotionSensor
-from rigwatch.workbench.explain.verdict import EQUAL, NEARLY, Verdict, Word
+from rigwatch.workbench.explain.indistinguishable import EQUAL, NEARLY
+from rigwatch.workbench.explain.verdict import Verdict, Word
 from rigwatch.workbench.explain.verdict_calibration import Evidence
 from rigwatch.workbench.fit import Fitted, block_differences, fit_model
 from rigwatch.workbench.ranking import Ranked, denied_sensors, judge_fit

@@ -16,7 +16,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rigwatch.workbench.data import NoiseFloor
-from rigwatch.workbench.explain.verdict import NEARLY, Verdict
+from rigwatch.workbench.explain.indistinguishable import NEARLY
+from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.fit import Fitted
 from rigwatch.workbench.ranking import MUCH_WORSE, Ranked
 

@@ -1,0 +1,184 @@
+"""Effects that a recording cannot tell from the best: its class, and rivals of other physics.
+
+The class are effects of the same physics, or with the same residual to first order, whose error is
+the same. Rivals are effects of other physics whose directions are similar and whose errors do not
+differ beyond chance, or beyond what other missing physics or the model's own error may favour.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigwatch.physics.engine.score import ALIKE
+from rigwatch.workbench.data import NoiseFloor
+from rigwatch.workbench.fit import block_differences
+from rigwatch.workbench.ranking import MUCH_WORSE, SAME, SIMILAR, Ranked
+
+EQUAL = 2.0
+"""Standard deviations of a paired difference below which two effects count as equal."""
+NO_DIFFERENCE = 1e-4
+"""Relative difference of errors that reflects only where two fits stopped."""
+PERHAPS = 1.0
+"""Standard deviations by which an effect with more parameters must be ahead to be a rival."""
+NEARLY = 0.8
+"""Share of the best effect's gain above which another effect may be the right one."""
+FAVOURED = 0.125
+"""Energy, in that of the healthy error, by which the model's own error may favour an effect."""
+
+
+def undistinguished(
+    best: Ranked, rows: Sequence[Ranked], *, trusted: bool
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Labels of effects that this recording cannot distinguish from the best: class and rivals.
+
+    Args:
+        best: the effect named.
+        rows: the ranking.
+        trusted: whether the best's residual is at the noise floor. If not, the cause of the rest
+            may favour one of two similar effects, so that neither rules out the other, and it
+            may lower the error of an effect with more parameters for no physical reason.
+    """
+    members, rivals = [best.label], []
+    for row in rows:
+        if row is best:
+            continue
+        cosine = best.cosines.get(row.label, 0.0)
+        if _same_shift(best, row):
+            members.append(row.label)
+        elif cosine > SAME or same_family(best, row):
+            if _in_class(best, row, cosine, trusted=trusted):
+                members.append(row.label)
+        elif _rivals(best, row, cosine, trusted=trusted):
+            rivals.append(row.label)
+    rivals += _parallel_to_rivals(rows, rivals, {*members, *rivals})
+    refining = {row.label for row in rows if row is not best and _lower(row) in members}
+    return tuple(label for label in members if label not in refining), tuple(rivals)
+
+
+def _lower(row: Ranked) -> str:
+    """Label of the effect that a row's effect describes in more detail, at the same port."""
+    return f"{row.placement.effect.refines}@{row.port}"
+
+
+def _parallel_to_rivals(
+    rows: Sequence[Ranked], rivals: Sequence[str], known: set[str]
+) -> list[str]:
+    """Labels of effects not fitted because they are parallel to a rival that was."""
+    return [
+        row.label
+        for row in rows
+        if row.fitted is None
+        and row.label not in known
+        and any(row.cosines.get(rival, 0.0) > SAME for rival in rivals)
+    ]
+
+
+def _in_class(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:
+    """Whether a parallel effect, or one of the same family, belongs to the best's class."""
+    if equal(best, row, cosine):
+        # At another port it does not refine the best, however many parameters its shape has.
+        return _is_simple_enough(best, row) or (cosine > SAME and row.port != best.port)
+    near = row.held_out_error < MUCH_WORSE * best.held_out_error
+    return not trusted and row.accepted and cosine > ALIKE and near and _is_simple_enough(best, row)
+
+
+def _same_shift(best: Ranked, row: Ranked) -> bool:
+    """Whether both shift the machine's only input or only output in time, with the same result.
+
+    A time-invariant machine responds to a delayed input with the same motion, delayed.
+    """
+    shifts = best.placement.effect.time_shift and row.placement.effect.time_shift
+    if not shifts or best.fitted is None or row.port == best.port:
+        return False
+    model = best.fitted.compiled.system.model
+    computed = {name for name, port in model.ports.items() if port.signal in model.quantities}
+    if computed & {best.port, row.port}:
+        return False
+    return len(model.driving()) == len(model.outputs) == 1 and best.cosines[row.label] > SIMILAR
+
+
+def _rivals(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:
+    """Whether an effect of other physics is a rival; with more parameters it must be no worse."""
+    if not row.accepted:
+        return False
+    if row.free > best.free:
+        no_worse = row.held_out_error <= best.held_out_error * (1 + NO_DIFFERENCE)
+        better = cosine > SIMILAR and lead(row, best) > PERHAPS
+        # At another port it does not refine the best, however many parameters its shape has.
+        not_worse = row.port != best.port and equal(best, row, cosine)
+        return trusted and ((cosine > ALIKE and (no_worse or not_worse)) or better)
+    if cosine > ALIKE and not trusted and row.held_out_error < MUCH_WORSE * best.held_out_error:
+        return True
+    return cosine > SIMILAR and equal(best, row, cosine)
+
+
+def at_other_ports(best: Ranked, rows: Sequence[Ranked], known: tuple[str, ...]) -> tuple[str, ...]:
+    """Labels of similar effects at another kind of port, if the residual is above the noise floor.
+
+    For example, a sensor delay that no effect describes fits nearly as well as a drive delay.
+    """
+    return tuple(
+        row.label
+        for row in rows
+        if row.accepted
+        and row.label not in known
+        and row.kind != best.kind
+        and best.cosines.get(row.label, 0.0) > SIMILAR
+        and row.held_out_error < MUCH_WORSE * best.held_out_error
+        and (row.gain or 0.0) > NEARLY * (best.gain or 0.0)
+    )
+
+
+def as_near_as_own_error(
+    best: Ranked, rows: Sequence[Ranked], known: tuple[str, ...], floor: NoiseFloor
+) -> tuple[str, ...]:
+    """Labels of similar effects that reach the floor too, so near that model error may decide.
+
+    The model's own error is the same in every block, so that a paired test takes it for evidence.
+    """
+    assert best.fitted is not None
+    most = floor.ratio(best.fitted.held_out) ** 2 + FAVOURED
+    return tuple(
+        row.label
+        for row in rows
+        if row.accepted
+        and row.fitted is not None
+        and row.label not in known
+        and row.free <= best.free
+        and best.cosines.get(row.label, 0.0) > SIMILAR
+        and not same_family(best, row)
+        and floor.ratio(row.fitted.held_out) ** 2 < most
+        and floor.reached(row.fitted.held_out)
+    )
+
+
+def same_family(best: Ranked, row: Ranked) -> bool:
+    """Whether both belong to one family of the library."""
+    family = best.placement.effect.family
+    return bool(family) and row.placement.effect.family == family
+
+
+def _is_simple_enough(best: Ranked, row: Ranked) -> bool:
+    """Whether it needs no more parameters than the best and refines no effect of its class."""
+    known = {best.effect, *(name.split("@")[0] for name in best.alike)}
+    return row.free <= best.free and row.placement.effect.refines not in known
+
+
+def equal(one: Ranked, other: Ranked, cosine: float) -> bool:
+    """Whether two have equal held-out errors; if one is not fitted, whether they are parallel."""
+    if other.fitted is None:
+        return cosine > SAME
+    assert one.fitted is not None
+    if not other.accepted:
+        return False
+    same = abs(other.held_out_error / one.held_out_error - 1) < NO_DIFFERENCE
+    return bool(same or abs(lead(one, other)) < EQUAL)
+
+
+def lead(one: Ranked, other: Ranked) -> float:
+    """Paired held-out difference in standard deviations; positive if `one` is better."""
+    assert one.fitted is not None
+    assert other.fitted is not None
+    difference = block_differences(other.fitted.held_out, one.fitted.held_out)
+    spread = difference.std(ddof=1) / np.sqrt(len(difference))
+    return float(difference.mean() / max(spread, 1e-300))
