@@ -17,7 +17,7 @@ from rigwatch.workbench.explain.adequacy import (
     with_change_told,
 )
 from rigwatch.workbench.explain.credibility import credible_verdict
-from rigwatch.workbench.explain.exchange import exchange
+from rigwatch.workbench.explain.exchange import Exchange, exchange
 from rigwatch.workbench.explain.excitation import cannot_tell, unexcited
 from rigwatch.workbench.explain.explanation import STRENGTH_TOLD, Explanation, explanation
 from rigwatch.workbench.explain.lower_floor import with_lower_floor
@@ -34,6 +34,7 @@ from rigwatch.workbench.explain.sets.pairs import two_effects
 from rigwatch.workbench.explain.sets.several_effects import may_need_several, several_effects
 from rigwatch.workbench.explain.verdict import Verdict, not_converged
 from rigwatch.workbench.ranking import (
+    MATERIAL,
     Progress,
     Ranked,
     no_progress,
@@ -113,7 +114,7 @@ def _with_exchange(
     """
     offer = exchange(bench, progress)
     named = verdict.best if verdict.word == "missing_effect" else None
-    if offer is None or (named is not None and named.held_out_error <= offer.held_out_error):
+    if offer is None or (named is not None and not _speaks_against(offer, named)):
         return found
     unit = bench.base.told_in
     told_offer = offer.text(unit, str(bench.study.folder))
@@ -125,6 +126,12 @@ def _with_exchange(
     return replace(
         found, verdict="undetermined", text=f"{text} {unit}", rivals=rivals, exchange=offer
     )
+
+
+def _speaks_against(offer: Exchange, named: Ranked) -> bool:
+    """Whether an exchange leaves materially less than an effect that is not the one it offers."""
+    same = named.label == f"{offer.effect}@{offer.port}"
+    return not same and named.held_out_error > (1 + MATERIAL) * offer.held_out_error
 
 
 def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked], Verdict]:
