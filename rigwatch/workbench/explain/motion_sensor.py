@@ -22,10 +22,10 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.data import Data, MotionSensor
-from rigwatch.workbench.explain.indistinguishable import EQUAL, NEARLY
+from rigwatch.workbench.explain.indistinguishable import EQUAL, NEARLY, lead
 from rigwatch.workbench.explain.verdict import Verdict, Word
 from rigwatch.workbench.explain.verdict_calibration import Evidence
-from rigwatch.workbench.fit import Fitted, block_differences, fit_model
+from rigwatch.workbench.fit import Fitted, fit_model
 from rigwatch.workbench.ranking import Ranked, denied_sensors, judge_fit
 
 STEPS = 2
@@ -196,7 +196,4 @@ def _named(bench: Bench, best: Ranked, rows: list[Ranked]) -> Verdict:
 
 def _is_better(one: Ranked, other: Ranked) -> bool:
     """Whether one has the lower held-out error by more than chance."""
-    assert one.fitted is not None
-    assert other.fitted is not None
-    difference = block_differences(other.fitted.held_out, one.fitted.held_out)
-    return bool(difference.mean() > EQUAL * difference.std(ddof=1) / np.sqrt(len(difference)))
+    return lead(one, other) > EQUAL

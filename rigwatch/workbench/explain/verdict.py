@@ -105,8 +105,10 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
     members, rivals = undistinguished(best, rows, trusted=trusted)
     if floor.method == "healthy motion":
         known = (*members, *rivals)
-        more = as_near_as_own_error(best, rows, known, floor)
-        rivals = (*rivals, *(more if trusted else at_other_ports(best, rows, known)))
+        if trusted:
+            rivals = (*rivals, *as_near_as_own_error(best, rows, known, floor))
+        else:
+            rivals = (*rivals, *at_other_ports(best, rows, known))
     evidence = Evidence(
         floor.left_over(base.held_out, best.fitted.held_out), _margin(best, rows, members + rivals)
     )

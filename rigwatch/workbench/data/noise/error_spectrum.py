@@ -31,8 +31,7 @@ class ErrorSpectrum:
     """The error to be expected of the model along a motion.
 
     Attributes:
-        energy: squared rms of the error in each band, in units of the noise floor, shape
-            (bands, outputs).
+        energy: squared rms of the error in each band, shape (bands, outputs).
     """
 
     energy: FloatArray
@@ -53,7 +52,7 @@ class ErrorSpectrum:
         if found is None:
             return np.inf
         share = 1.0 if at is None else float(at.mean())
-        return float(np.maximum(found / share / rms**2 - self.energy, 0.0).sum(axis=0).mean())
+        return float(np.mean(np.maximum(found / share - self.energy, 0.0).sum(axis=0) / rms**2))
 
 
 def expected_error(
@@ -70,8 +69,7 @@ def expected_error(
     if error is None or least is None or motion is None:
         return None
     larger = np.maximum(motion / np.maximum(least, 1e-300), 1.0)
-    floor = np.nanmean(residuals**2, axis=tuple(range(residuals.ndim - 1)))
-    return ErrorSpectrum(error * larger / floor)
+    return ErrorSpectrum(error * larger)
 
 
 def band_energy(signals: FloatArray) -> FloatArray | None:
