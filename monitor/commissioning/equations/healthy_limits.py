@@ -29,6 +29,11 @@ from monitor.signals import Codes
 from rigwatch.wire.arrays import FloatArray
 
 NEVER = 1 << 40
+CHANCE = 3.0
+"""Standard deviations that a random residual's friction reaches within a recording. That of a
+generator which repeats itself to the sample is the same in each period: it shows one of the values
+that it takes as soon as the generator's clock slides.
+"""
 LOW, HIGH = 5.0, 90.0
 """Percentiles of windows that represent the spread at rest, and its growth with the motion."""
 
@@ -114,11 +119,12 @@ def _extremes(part: HealthyPart, rules: DecisionRules, skip: int) -> Extremes:
     allowed = out[SPREAD] ** 2
     error = part.judged[:, E]
     relative = error[skip:] ** 2 / allowed[skip:]
+    medium = _largest(error, MEDIUM, allowed, skip)
     return Extremes(
         lasting=float(mean_over(relative, min(LASTING, relative.size)).max()),
         short=_largest(error, SHORT, allowed, skip),
-        medium=_largest(error, MEDIUM, allowed, skip),
-        friction=float(np.abs(out[DEVIATIONS][skip:]).max()),
+        medium=medium,
+        friction=max(float(np.abs(out[DEVIATIONS][skip:]).max()), CHANCE * np.sqrt(medium)),
     )
 
 
