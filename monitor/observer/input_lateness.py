@@ -96,10 +96,16 @@ def follow_lateness(  # noqa: PLR0917 -- a kernel
     least = min(least, _rubbing(kept, first) / RATHER)
     if energy > largest and _left(found, kept, first) < least:
         kept[TAU] = found
-    elif _left(kept[TAU], kept, first) > energy:
-        kept[TAU] = 0.0
+    else:
+        kept[TAU] = _towards_none(kept[TAU], found)
     kept[FOR] = kept[FOR] + 1.0 if abs(kept[TAU]) > UNSTEADY else 0.0
     kept[AGO] = 0.0 if kept[FOR] >= SHOWN else min(kept[AGO] + 1.0, RECENT)
+
+
+@njit()
+def _towards_none(known: float, found: float) -> float:
+    """The known lateness, or less of it if less is found, as where an edge slides past a sample."""
+    return min(max(found, 0.0), known) if known > 0.0 else max(min(found, 0.0), known)
 
 
 @njit()
