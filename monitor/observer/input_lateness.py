@@ -39,6 +39,8 @@ explain the residual, friction is an alarm and a lateness hides one.
 """
 UNSURE = 0.15
 """Relative error of the response: equations fitted to one lateness are less accurate at another."""
+HALF = 0.5
+"""Mean lateness of inputs that slide past the samples."""
 UNSTEADY = 0.2
 """Lateness, and change of it, that matters [samples]."""
 GROWS = 0.6
@@ -127,6 +129,15 @@ def _average(value: float, place: int, memory: float, kept: FloatArray) -> None:
 def is_late(kept: FloatArray) -> bool:
     """Whether there is or was a lateness, which may change."""
     return kept[AGO] < RECENT
+
+
+@njit()
+def unsure_lateness(kept: FloatArray) -> float:
+    """The lateness whose response is not accurate [samples]; of inputs that slide, half a sample.
+
+    Where an edge is close to a sample, some inputs act before it and some after it.
+    """
+    return max(abs(kept[TAU]), HALF) if is_late(kept) else abs(kept[TAU])
 
 
 @njit()

@@ -69,6 +69,7 @@ from monitor.observer.input_lateness import (
     lateness_changes,
     rubs,
     slides,
+    unsure_lateness,
 )
 from monitor.observer.lagged_motion import EMPTY, FIRST, TAINTED
 from monitor.observer.missing_force import LATE_UNIT, MOVED, UNSURE_INPUT, E
@@ -229,7 +230,8 @@ def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatA
         kept.rows[head, c] = row[c]
     late = kept.lateness[TAU] * row[LATE_UNIT]
     kept.rows[head, ERROR] = row[ERROR] - late
-    kept.rows[head, LATENESS] = np.hypot(UNSURE * late, row[UNSURE_INPUT])
+    unsure = UNSURE * unsure_lateness(kept.lateness) * row[LATE_UNIT]
+    kept.rows[head, LATENESS] = np.hypot(unsure, row[UNSURE_INPUT])
     kept.rows[head, SPEED] = speed
     kept.rows[head, UNDECIDED] = undecided(row[MOVED], kept.edges)
     for c in range(levels.size):
