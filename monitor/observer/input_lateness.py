@@ -47,6 +47,8 @@ GROWS = 0.6
 """Ratio of the lateness of the slow memory to that of the quick one above which it has grown since
 long before: a sudden one reaches it only after the slow memory, a clock's slide at once.
 """
+GROWTH = 0.05
+"""Difference between the two memories' lateness, about that of half a sample in four seconds."""
 SHOWN, RECENT = 128.0, 4096.0
 """Samples for which a lateness must be found to count, as at a start there may be a false one; and
 those after which one no longer found is forgotten: the longest interval between skips.
@@ -151,6 +153,18 @@ def slides(kept: FloatArray) -> bool:
     left = _left(found, kept, OF_QUICK)
     explains = left < (1.0 - EXPLAINS) * kept[OF_QUICK + ERRORS]
     return grown and explains and RATHER * left < _rubbing(kept, OF_QUICK)
+
+
+@njit()
+def seems_to_grow(kept: FloatArray) -> bool:
+    """Whether the newest samples show more of a lateness than those before.
+
+    Dry friction may explain them as well: of a triangle the two are nearly alike.
+    """
+    found, before = _best(kept, OF_QUICK), _best(kept, OF_SLOW)
+    more = abs(found) > UNSTEADY and before * np.sign(found) > 0.0
+    more = more and abs(found) - abs(before) > GROWTH
+    return more and _left(found, kept, OF_QUICK) < MOST_OF_IT * kept[OF_QUICK + ERRORS]
 
 
 @njit()

@@ -68,6 +68,7 @@ from monitor.observer.input_lateness import (
     is_late,
     lateness_changes,
     rubs,
+    seems_to_grow,
     slides,
     unsure_lateness,
 )
@@ -220,6 +221,8 @@ def _follow_inputs(
         follow_lateness(row, largest * variance, judging, learns, anew, kept.lateness)
     if not judging and lateness_changes(kept.lateness):
         count[CHANGED] = -LONG
+    elif not judging and seems_to_grow(kept.lateness):
+        count[CHANGED] = 0
 
 
 @njit()
