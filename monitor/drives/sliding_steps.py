@@ -40,7 +40,9 @@ SURE, STRAYS = 3, 3
 FORGET = 0.3
 """Weight of the newest interval."""
 ALONE = 1024.0
-"""Samples after which a skip that none follows is no skip, as when a drive changes its phase."""
+"""Samples after which a skip that none follows is taken for none, as when a drive changes its phase;
+a slower clock's next one is still counted.
+"""
 
 
 class Sliding(NamedTuple):
@@ -139,7 +141,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
             share, following = 1.0, 0.5 * (now + following)
         mean[k] = (1.0 - share) * now + share * following
         followed[k] = kept[SKIPS] >= SURE
-        known[k] = kept[SKIPS] == 0 or followed[k]
+        known[k] = kept[SKIPS] == 0 or followed[k] or kept[AGE] > ALONE
         if way != 0:
             _follow(way, kept)
         elif _lost(kept):
@@ -221,5 +223,5 @@ def _lost(kept: FloatArray) -> bool:
     if kept[SKIPS] == 0.0:
         return False
     if kept[SKIPS] == 1.0:
-        return kept[AGE] > ALONE
+        return kept[AGE] > LONGEST
     return kept[AGE] > MISSED * kept[INTERVAL]

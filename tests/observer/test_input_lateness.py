@@ -11,7 +11,9 @@ from monitor.observer.input_lateness import (
     lateness_changes,
     no_lateness,
     rubs,
+    seems_to_grow,
     slides,
+    unsure_lateness,
 )
 from monitor.observer.missing_force import COLUMNS, DRY_UNIT, LATE_UNIT, E
 
@@ -55,6 +57,30 @@ def test_a_lateness_that_grows_slowly_is_told_from_a_sudden_one(since, grows) ->
 
     assert slides(kept) == grows
     assert (kept[TAU] > 0.4) == grows
+
+
+def test_a_lateness_that_shrinks_is_followed_to_none() -> None:
+    # The edges slide towards the samples: the less is left, the less of it a lateness explains.
+    tau = np.linspace(-0.5, 0.0, N)
+    other = 0.4 * np.sin(5.3 * AT + 0.3)
+
+    kept = learnt(tau * LATE + other)
+
+    assert kept[TAU] == pytest.approx(0.0, abs=0.06)
+
+
+def test_a_lateness_that_friction_explains_as_well_seems_to_grow() -> None:
+    dry = np.sign(np.sin(AT + 0.2))
+    kept = learnt(np.linspace(0.0, 0.6, N) * LATE + 0.2 * dry, dry=dry)
+
+    assert seems_to_grow(kept)
+    assert not seems_to_grow(learnt(0.6 * LATE))
+    assert not seems_to_grow(learnt(0.6 * dry, dry=dry))
+
+
+def test_inputs_that_slide_are_unsure_where_an_edge_meets_a_sample() -> None:
+    assert unsure_lateness(learnt(np.linspace(0.6, 0.0, N) * LATE)) == 0.5
+    assert unsure_lateness(learnt(np.zeros(N))) == 0.0
 
 
 def test_friction_is_not_learnt_as_lateness() -> None:
