@@ -40,8 +40,8 @@ SURE, STRAYS = 3, 3
 FORGET = 0.3
 """Weight of the newest interval."""
 ALONE = 1024.0
-"""Samples after which a skip that none follows is taken for none, as when a drive changes its phase;
-a slower clock's next one is still counted.
+"""Samples after which a skip that none follows is taken for a jump of the drive's phase. The next
+one of a slower clock is still counted.
 """
 
 

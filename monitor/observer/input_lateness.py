@@ -157,14 +157,15 @@ def slides(kept: FloatArray) -> bool:
 
 @njit()
 def seems_to_grow(kept: FloatArray) -> bool:
-    """Whether the newest samples show more of a lateness than those before.
+    """Whether the newest samples show more of a lateness than those before, or dry friction.
 
-    Dry friction may explain them as well: of a triangle the two are nearly alike.
+    Either explains most of them: of a triangle the two are nearly alike.
     """
     found, before = _best(kept, OF_QUICK), _best(kept, OF_SLOW)
     more = abs(found) > UNSTEADY and before * np.sign(found) > 0.0
     more = more and abs(found) - abs(before) > GROWTH
-    return more and _left(found, kept, OF_QUICK) < MOST_OF_IT * kept[OF_QUICK + ERRORS]
+    left = max(_left(found, kept, OF_QUICK), _rubbing(kept, OF_QUICK))
+    return more and left < MOST_OF_IT * kept[OF_QUICK + ERRORS]
 
 
 @njit()
