@@ -19,6 +19,8 @@ NEUTRAL = {"coulomb": 0.0, "actuator_gain": 1.0}
 ENDED = ("normal", "cleared_unacknowledged")
 NAMELESS = "departure"
 """The alarm that reports a fault without naming it."""
+OF_THE_RIG = (NAMELESS, "dry_friction", "stiction", "other_fault")
+"""Alarms that answer to what is done to the rig; others are about its measuring chain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +145,7 @@ class Narrator:
             self._say(f"              $ rigwatch ack {self._config} {ended.name}")
 
     def _delay(self, alarm: Alarm) -> str:
-        if self._last is None or alarm.seq < self._last.seq:
+        if self._last is None or alarm.seq < self._last.seq or alarm.name not in OF_THE_RIG:
             return ""
         late = alarm.seq - self._last.seq
         onset = max(0, alarm.onset_seq - self._last.seq)

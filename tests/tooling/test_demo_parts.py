@@ -146,6 +146,9 @@ def test_an_alarm_is_reported_with_its_cause_and_its_delay_after_what_was_done()
     assert "Stop and look." in said[2]
     narrator.alarm(alarm("departure", begins + 32))
     assert "alarm raised at 125 ms" in said[4]
+    narrator.alarm(alarm("stale", begins + 900))
+    assert "after the fault began" not in said[6]
+    assert "ALARM" in said[6]
 
 
 def test_the_wait_for_the_next_fault_is_told_at_the_start_and_after_each_one() -> None:
