@@ -27,7 +27,7 @@ VIEWER_PACKAGES := mesa-vulkan-drivers libvulkan1
 BROWSER_PACKAGES := chromium chromium-driver
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test sbom vulnerabilities docs demo bench lint tests-read unit again nightly demo-headless mutate lock viewer-packages clean
+.PHONY: help setup test sbom vulnerabilities docs demo bench lint tests-read unit again nightly commissioned demo-headless mutate lock viewer-packages clean
 
 help:  ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -37,29 +37,32 @@ setup: $(STAMPS)/dev  ## only the virtual environment, in .venv
 demo: $(STAMPS)/run  ## simulated rig, monitor and live dashboard: friction appears, an alarm names it
 	@rigwatch demo $(DEMO)
 
-# The demo mostly waits for its rig: style and types are checked beside it.
 SYNC := $(if $(filter output-sync,$(.FEATURES)),--output-sync=target)
 
-test: $(STAMPS)/dev  ## everything that is checked: style, types, layers, demo, tests
-	@$(MAKE) --no-print-directory -j3 $(SYNC) lint demo-headless viewer-packages tests-read
-	@$(MAKE) --no-print-directory unit
-	@$(MAKE) --no-print-directory sbom
+# The packages of the tests are installed and the tests read while the demo makes its model, whose
+# kernels the tests use. The demo's rig then mostly waits, and types are checked in what the tests
+# leave of the cores: both run beside them.
+test: $(STAMPS)/run  ## everything that is checked: style, types, layers, demo, tests
+	@$(MAKE) --no-print-directory -j6 $(SYNC) unit demo-headless lint sbom FIRST="commissioned tests-read"
 
 lint: $(STAMPS)/dev  ## ruff, mypy --strict and the rules of which layer imports which
 	@ruff check .
 	@ruff format --check .
-	@mypy
+	@nice -n 15 mypy
 	@lint-imports
 
-demo-headless: $(STAMPS)/run
+commissioned: $(STAMPS)/run
+	@rigwatch demo --commission-only
+
+demo-headless: commissioned
 	@rigwatch demo --headless
 
-# Once, beside what waits, so that each of the workers finds the bytecode of the tests, and the
-# kernels that this one compiles.
+# Once, so that each of the workers finds the bytecode of the tests, and the kernels that this one
+# compiles.
 tests-read: $(STAMPS)/dev
 	@nice pytest -k test_the_hidden_effect_ranks_first -p no:cacheprovider $(TESTS) >/dev/null || true
 
-unit: $(STAMPS)/dev viewer-packages
+unit: $(STAMPS)/dev viewer-packages $(FIRST)
 	@if [ "$${CI:-}" = true ] && [ ! -d "$${RIGWATCH_DATA:-}" ]; then \
 		echo "test: RIGWATCH_DATA names no folder with the measured data sets" >&2; exit 1; fi
 	@pytest -n $(WORKERS) --dist loadgroup --no-loadscope-reorder --cache-clear $(TESTS) || $(MAKE) --no-print-directory again

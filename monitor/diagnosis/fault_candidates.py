@@ -60,6 +60,7 @@ class Suspect:
         explained: share of the change's energy.
         parameters: free ones.
         family: of the effect, see `Effect`.
+        physics: of the effect in a sentence.
         alike: others that these samples cannot distinguish from it, as "effect@port".
     """
 
@@ -69,6 +70,7 @@ class Suspect:
     explained: float
     parameters: int
     family: str = ""
+    physics: str = ""
     alike: tuple[str, ...] = ()
 
     @property
@@ -176,8 +178,11 @@ def _sized(
         candidate = found[one.index]
         worth = place < SIZED and one.explained > least
         explained = sized(at, candidate, one.strength, observed) if worth else one.explained
-        free, family = candidate.effect.free, candidate.effect.family
-        row = Suspect(candidate.name, candidate.port, one.p_value, explained, free, family)
+        effect = candidate.effect
+        row = Suspect(
+            candidate.name, candidate.port, one.p_value, explained,
+            effect.free, effect.family, effect.physics,
+        )  # fmt: skip
         (fitted if worth else others).append(row)
     # What explains the same but for rounding stays in the order of ports: the load comes first.
     return sorted(fitted, key=lambda row: -round(row.explained, 4)) + others
@@ -217,15 +222,14 @@ def _named(rows: Sequence[Suspect], noise: float, error: float) -> list[Suspect]
 
 
 def in_words(rows: Sequence[Suspect]) -> str:
-    """The ranking in a sentence."""
+    """The ranking in sentences for people who know neither the library nor p-values."""
     if not rows or rows[0].p_value >= LEVEL:
-        found = f" ({rows[0].label}, p {_p(rows[0].p_value)})" if rows else ""
-        return f"probably missing: cannot tell, no effect is significant{found}"
+        nearest = f" (the nearest is {_fit(rows[0])})" if rows else ""
+        return f"probably missing: cannot tell, no effect stands out from chance{nearest}"
     best = rows[0]
-    figures = f"p {_p(best.p_value)}, {best.explained:.0%} of the change"
     if best.explained < EXPLAINED:
-        return f"probably missing: no known effect; the nearest is {best.label} ({figures})"
-    text = f"probably missing: {best.label} ({figures})"
+        return f"probably missing: no known effect; the nearest is {_fit(best)}"
+    text = f"probably missing: {_fit(best)}"
     if not best.alike:
         return text
     named, more = best.alike[:6], len(best.alike) - 6
@@ -233,5 +237,18 @@ def in_words(rows: Sequence[Suspect]) -> str:
     return f"{text}; cannot be told from {', '.join(named)}{rest}"
 
 
-def _p(value: float) -> str:
-    return "< 1e-6" if value < 1e-6 else f"= {value:.2g}"
+def _fit(row: Suspect) -> str:
+    """An effect, its physics, and how well it explains the change."""
+    physics = row.physics.strip().rstrip(".")
+    plain = f" ({physics[0].lower()}{physics[1:]})" if physics else ""
+    share = f"explains {row.explained:.0%} of the change"
+    return f"{row.label}{plain}: {share}, by chance {_chance(row.p_value)}"
+
+
+def _chance(p_value: float) -> str:
+    """How often chance alone would explain as much, as one in so many."""
+    if p_value < 1e-6:
+        return "less than once in a million"
+    if p_value > 0.5:
+        return "more often than not"
+    return f"about once in {float(f'{1 / p_value:.2g}'):,.0f}"

@@ -24,6 +24,13 @@ RECORDINGS = {
     "friction": "scenarios/known_friction.toml",
 }
 """The recordings for commissioning, by role, and the scenario of each."""
+WHAT = {
+    "chirp": "the healthy rig, driven from slow to fast",
+    "healthy": "the healthy rig in its usual motion",
+    "friction": "the same motion with a friction of known size",
+}
+"""What each of them shows."""
+STEPS = len(RECORDINGS) + 2
 
 
 def ensure_model(config: Path, folder: Path, say: Callable[[str], None]) -> Path:
@@ -37,18 +44,22 @@ def ensure_model(config: Path, folder: Path, say: Callable[[str], None]) -> Path
     if model.is_file() and stamp.is_file() and stamp.read_text(encoding="utf-8") == made_from:
         say(f"model of the rig: {relative(model)}, made in an earlier run")
         return model
-    say("commissioning: the model is made from three recordings, as on a real rig")
-    say("  this takes about a minute, more on a busy machine; later runs use the same model")
+    say("commissioning: first the monitor learns how the healthy rig moves, as on a real rig:")
+    say("  three recordings and a model from them; nothing is shown in a browser before that")
+    say(f"  {STEPS} commands run here by themselves, about a minute in all, more on a busy machine")
+    say("  (later runs use the same model)")
     sessions = {role: folder / "commissioning" / f"{role}.mcap" for role in RECORDINGS}
-    for role, session in sessions.items():
+    for number, (role, session) in enumerate(sessions.items(), 1):
         session.parent.mkdir(parents=True, exist_ok=True)
         session.unlink(missing_ok=True)
         scenario = find_config(RECORDINGS[role])
+        say(f"  {number} of {STEPS}: recording {WHAT[role]}")
         _run(["plant", "--session", session, scenario], say)
     roles = [part for role, session in sessions.items() for part in (f"--{role}", session)]
+    say(f"  {STEPS - 1} of {STEPS}: making the model, {relative(model)}, from the recordings")
     _run(["commission", *roles, "--scheme", "transfer", "--output", model], say)
     # The trial also compiles the monitor's kernels, so that the live monitor starts quickly.
-    say("the model is tried on the recording with known friction")
+    say(f"  {STEPS} of {STEPS}: trying the model on the recording with known friction")
     _run(["replay", sessions["friction"], "--model", model], say)
     stamp.write_text(made_from, encoding="utf-8")
     return model
@@ -56,7 +67,7 @@ def ensure_model(config: Path, folder: Path, say: Callable[[str], None]) -> Path
 
 def _run(arguments: list[str | Path], say: Callable[[str], None]) -> None:
     words = [relative(word) if isinstance(word, Path) else word for word in arguments]
-    say(f"  $ rigwatch {shlex.join(words)}")
+    say(f"    $ rigwatch {shlex.join(words)}")
     command = [sys.executable, "-m", "rigwatch", *words]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:

@@ -4,6 +4,7 @@ It reports what is done to the rig, which the monitor does not know, the monitor
 the monitor finds to be missing in its model.
 """
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -15,8 +16,11 @@ ACTS = {
     "actuator_gain": ("the valve's gain falls to {value:.0%}", "the valve's gain is whole again"),
 }
 NEUTRAL = {"coulomb": 0.0, "actuator_gain": 1.0}
+ENDED = ("normal", "cleared_unacknowledged")
 NAMELESS = "departure"
 """The alarm that reports a fault without naming it."""
+OF_THE_RIG = (NAMELESS, "dry_friction", "stiction", "other_fault")
+"""Alarms that answer to what is done to the rig; others are about its measuring chain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,15 +54,15 @@ class Narrator:
     Args:
         scenario: the changes to the rig.
         say: called with each line.
-        acknowledge: the command by which a person says that an alarm was seen.
+        rig: the rig's configuration, for the commands that people are told.
 
     Attributes:
         alarms: raised so far.
     """
 
-    def __init__(self, scenario: Scenario, say: Callable[[str], None], acknowledge: str) -> None:
+    def __init__(self, scenario: Scenario, say: Callable[[str], None], rig: str) -> None:
         self.alarms: list[Alarm] = []
-        self._say, self._acknowledge = say, acknowledge
+        self._say, self._config = say, rig
         self._rate = scenario.plant.sample_rate
         self._acts = acts(scenario)
         self._next = next(self._acts, None)
@@ -109,7 +113,9 @@ class Narrator:
             self.alarms.append(alarm)
             self._say(f"{self._time(alarm.seq)} ALARM: {alarm.cause}{self._delay(alarm)}")
             self._say(f"            what to do: {alarm.guidance}")
-        elif alarm.state in ("normal", "cleared_unacknowledged"):
+            if alarm.name != NAMELESS:
+                self._say(f"            all alarms: $ rigwatch alarms {self._config}")
+        elif alarm.name in {told.name for told in self.alarms} and alarm.state in ENDED:
             self._tell_end()
             self._ended = alarm
             if alarm.name != NAMELESS:
@@ -120,6 +126,9 @@ class Narrator:
         if event.code == PROBABLY_MISSING:
             found = event.text.rpartition("probably missing: ")[2]
             self._say(f"            probably missing in the rig's model: {found}")
+            effect = re.search(r"(\w+)@\w", found)  # an effect at a port is written effect@port
+            if effect:
+                self._say(f"            more about it: $ rigwatch effects {effect[1]}")
 
     def _tell_end(self) -> None:
         """Report the end of an alarm; that of a departure only if no named fault replaced it."""
@@ -130,14 +139,13 @@ class Narrator:
             self._ended = None
 
     def _tell_how_to_acknowledge(self, ended: Alarm) -> None:
-        """Say once that an alarm stands until somebody has seen it, and the command for that."""
-        if ended.state == "cleared_unacknowledged" and self._acknowledge:
-            self._say("            the alarm stands until somebody acknowledges it:")
-            self._say(f"              $ {self._acknowledge} {ended.name}")
-            self._acknowledge = ""
+        """Say that an alarm stands until somebody has seen it, and the command for that."""
+        if ended.state == "cleared_unacknowledged":
+            self._say("            the alarm is kept until somebody says that it was seen:")
+            self._say(f"              $ rigwatch ack {self._config} {ended.name}")
 
     def _delay(self, alarm: Alarm) -> str:
-        if self._last is None or alarm.seq < self._last.seq:
+        if self._last is None or alarm.seq < self._last.seq or alarm.name not in OF_THE_RIG:
             return ""
         late = alarm.seq - self._last.seq
         onset = max(0, alarm.onset_seq - self._last.seq)

@@ -76,7 +76,7 @@ class Show:
         self._config = load_rig(rig)
         assert self._config.plant is not None
         scenario = load_scenario(self._config.plant.scenario)
-        self._narrator = Narrator(scenario, say, f"rigwatch ack {relative(self._rig)}")
+        self._narrator = Narrator(scenario, say, relative(self._rig))
         self._first = self._seen = 0
         self._up: subprocess.Popen[str] | None = None
 

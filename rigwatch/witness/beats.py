@@ -3,15 +3,13 @@
 Another watchdog raises an alarm when they stop, whatever ended: monitor, witness or the machine.
 """
 
-import http.client
 import threading
-import urllib.error
-import urllib.request
 from pathlib import Path
 
 from rigwatch.wire.errors import ConfigError, reason_of
 from rigwatch.wire.host import replace_file
 from rigwatch.witness.bounded import Bounded
+from rigwatch.witness.cut_request import CutRequest
 
 TIMEOUT = 5.0
 """Longest wait for each part of the answer to a ping [s]."""
@@ -78,26 +76,9 @@ class Pinger:
 
     def _ping(self) -> str:
         """Ping; returns why it failed, "" if it did not."""
-        found = ["no answer"]
+        found, request = ["no answer"], CutRequest(self._url, TIMEOUT)
         try:
-            self._bounded.call(lambda: found.append(_asked(self._url)), WHOLE)
+            self._bounded.call(lambda: found.append(request.ask()), WHOLE, request.cut)
         except TimeoutError as error:
             return str(error)
         return found[-1]
-
-
-def _asked(url: str) -> str:
-    """Why a URL does not answer with success; "" if it does."""
-    try:
-        with urllib.request.urlopen(url, timeout=TIMEOUT):
-            return ""
-    except urllib.error.HTTPError as error:
-        return f"the server answers {error.code}"
-    except urllib.error.URLError as error:
-        return reason_of(error.reason) if isinstance(error.reason, OSError) else str(error.reason)
-    except (ValueError, http.client.InvalidURL):
-        return "the address is not valid"
-    except http.client.HTTPException:
-        return "the answer is not HTTP"
-    except OSError as error:
-        return reason_of(error)

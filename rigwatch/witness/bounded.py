@@ -10,7 +10,8 @@ MOST_HUNG = 4
 class Bounded:
     """Calls one kind of work, each time in a thread of its own.
 
-    A thread that hangs cannot be ended. It is left behind, and does not keep the process alive.
+    A thread that hangs cannot be ended from outside. It is left behind until its work ends, and
+    does not keep the process alive.
 
     Args:
         name: of the threads.
@@ -20,11 +21,15 @@ class Bounded:
         self._name = name
         self._hung: list[threading.Thread] = []
 
-    def call(self, work: Callable[[], None], longest: float) -> None:
+    def call(
+        self, work: Callable[[], None], longest: float, cut: Callable[[], None] | None = None
+    ) -> None:
         """Call `work` and wait for it.
 
         Args:
+            work: called in the other thread.
             longest: time for it [s].
+            cut: called after that time, to make `work` return.
 
         Raises:
             TimeoutError: it has not returned in time, or too many calls before it have not yet.
@@ -36,5 +41,7 @@ class Bounded:
         thread.start()
         thread.join(longest)
         if thread.is_alive():
+            if cut is not None:
+                cut()
             self._hung.append(thread)
             raise TimeoutError(f"not finished within {longest:g} s")

@@ -76,7 +76,7 @@ def test_every_key_of_a_configuration_has_a_description() -> None:
 
 
 def test_help_is_quick_because_nothing_slow_is_imported() -> None:
-    slow = ("numba", "zenoh", "rerun", "scipy", "pyarrow", "pymodbus")
+    slow = ("numba", "zenoh", "rerun", "scipy", "pyarrow", "pymodbus", "numpy", "google.protobuf")
     code = (
         "import sys, rigwatch.commands as c\n"
         "try: c.main(['--help'])\n"

@@ -31,7 +31,7 @@ from tests.bus.rig import ROOT, TestRig, answers, free_port, kill, stopped
 from tests.daq.rig import ToySource, in_thread
 from tests.waiting import PATIENCE, eventually
 
-pytestmark = pytest.mark.xdist_group("many-rigs")
+pytestmark = [pytest.mark.xdist_group("many-rigs"), pytest.mark.long]
 WELL = ("left", "right", "modbus")
 
 

@@ -78,6 +78,21 @@ def test_a_healthy_rig_leaves_nothing_to_be_named() -> None:
     assert "cannot tell" in in_words(suspects(evidence(), RIG, library()))
 
 
+@pytest.mark.parametrize(
+    ("p_value", "words"),
+    [
+        (1e-9, "by chance less than once in a million"),
+        (0.0043, "by chance about once in 230"),
+        (1.0, "by chance more often than not"),
+    ],
+)
+def test_a_probability_is_told_as_once_in_so_many(p_value: float, words: str) -> None:
+    row = Suspect("coulomb", "load", p_value, 0.99, 1, physics="Dry surfaces resist.")
+    text = in_words([row])
+    assert f"coulomb@load (dry surfaces resist): explains 99% of the change, {words}" in text
+    assert ("cannot tell" in text) == (p_value > 0.01)
+
+
 def test_what_no_effect_explains_is_not_given_a_name() -> None:
     healthy = evidence()
     time_ = np.arange(len(healthy.change)) / RATE
@@ -158,6 +173,8 @@ def test_friction_on_the_simulated_rig_is_named_after_its_alarm() -> None:
     eventually(explained, "the change is explained")
     assert len(found) == 1
     assert found[0].code == "PROBABLY MISSING"
-    assert "probably missing: coulomb@load (p < 1e-6" in found[0].text
+    plain = "(dry surfaces resist sliding with a force that does not depend on speed)"
+    assert f"probably missing: coulomb@load {plain}: explains " in found[0].text
+    assert "of the change, by chance less than once in a million" in found[0].text
     standing = explainer.with_causes(monitor.alarms.standing())
     assert any("probably missing: coulomb@load" in alarm.cause for alarm in standing)

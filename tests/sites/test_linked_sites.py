@@ -18,7 +18,7 @@ from rigwatch.wire.session import open_session
 from tests.bus.rig import CONFIG, TestRig, answers, free_port, kill
 from tests.waiting import PATIENCE, eventually
 
-pytestmark = pytest.mark.xdist_group("sites")
+pytestmark = [pytest.mark.xdist_group("sites"), pytest.mark.long]
 RATE = 512.0
 RING = '\n[recorder]\nfolder = "{}"\nsegment = 3.0\nflush = 0.1\nremote = {}\n'
 SMALL = "ring_megabytes = 0.3\n"

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 STATE, MOUNTED = "/var/lib/rigwatch", "/etc/rigwatch/rig.toml"
 START_TIMEOUT = 150.0
 
-pytestmark = pytest.mark.xdist_group("rig")
+pytestmark = [pytest.mark.xdist_group("rig"), pytest.mark.long]
 
 
 def simulated_services() -> dict[str, dict[str, Any]]:

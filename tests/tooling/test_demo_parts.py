@@ -107,19 +107,30 @@ def test_acts_follow_the_scenario_through_its_cycles() -> None:
 
 def narrator_to(said: list[str]) -> Narrator:
     scenario = load_scenario(find_config("scenarios/demo.toml"))
-    return Narrator(scenario, said.append, "rigwatch ack rig.toml")
+    return Narrator(scenario, said.append, "rig.toml")
 
 
-def test_how_an_alarm_that_has_gone_is_acknowledged_is_told_once() -> None:
+def test_each_fault_is_told_with_the_commands_to_look_at_it_and_to_acknowledge_it() -> None:
     said: list[str] = []
     narrator = narrator_to(said)
-    for seq in (5200, 9200):
-        narrator.alarm(alarm("dry_friction", seq))
-        narrator.alarm(alarm("dry_friction", seq + 500, "cleared_unacknowledged"))
-    assert [line.strip() for line in said if "ack" in line] == [
-        "the alarm stands until somebody acknowledges it:",
-        "$ rigwatch ack rig.toml dry_friction",
+    for name, seq in (("dry_friction", 5200), ("other_fault", 9200)):
+        narrator.alarm(alarm("departure", seq))
+        narrator.alarm(alarm(name, seq))
+        narrator.alarm(alarm(name, seq + 500, "cleared_unacknowledged"))
+    assert [line.partition("$ ")[2] for line in said if "$" in line] == [
+        "rigwatch alarms rig.toml",
+        "rigwatch ack rig.toml dry_friction",
+        "rigwatch alarms rig.toml",
+        "rigwatch ack rig.toml other_fault",
     ]
+
+
+def test_the_end_of_an_alarm_that_nobody_was_told_of_is_not_told() -> None:
+    said: list[str] = []
+    narrator = narrator_to(said)
+    narrator.alarm(alarm("link", 0, "cleared_unacknowledged"))
+    narrator.judged(1000)
+    assert said == []
 
 
 def test_an_alarm_is_reported_with_its_cause_and_its_delay_after_what_was_done() -> None:
@@ -134,7 +145,10 @@ def test_an_alarm_is_reported_with_its_cause_and_its_delay_after_what_was_done()
     assert "first sign 47 ms after the fault began, named at 125 ms" in said[1]
     assert "Stop and look." in said[2]
     narrator.alarm(alarm("departure", begins + 32))
-    assert "alarm raised at 125 ms" in said[3]
+    assert "alarm raised at 125 ms" in said[4]
+    narrator.alarm(alarm("stale", begins + 900))
+    assert "after the fault began" not in said[6]
+    assert "ALARM" in said[6]
 
 
 def test_the_wait_for_the_next_fault_is_told_at_the_start_and_after_each_one() -> None:
@@ -154,12 +168,18 @@ def test_the_wait_for_the_next_fault_is_told_at_the_start_and_after_each_one() -
 def test_what_is_missing_in_the_model_is_told_and_other_events_are_not() -> None:
     said: list[str] = []
     narrator = narrator_to(said)
-    text = "dry_friction: probably missing: coulomb@load (p < 1e-6, 99% of the change)"
+    found = "coulomb@load (dry surfaces resist sliding): explains 99% of the change"
+    text = f"dry_friction: probably missing: {found}"
     narrator.explain(Event("monitor", 0, "error", PROBABLY_MISSING, text))
     narrator.explain(Event("daq", 0, "warning", "CLOCK STEP", "the clock stepped"))
     assert [line.strip() for line in said] == [
-        "probably missing in the rig's model: coulomb@load (p < 1e-6, 99% of the change)"
+        f"probably missing in the rig's model: {found}",
+        "more about it: $ rigwatch effects coulomb",
     ]
+    said.clear()
+    nothing = "departure: probably missing: cannot tell, the ranking failed"
+    narrator.explain(Event("monitor", 0, "error", PROBABLY_MISSING, nothing))
+    assert not any("$" in line for line in said)
 
 
 def test_a_departure_that_gets_a_name_has_not_gone() -> None:

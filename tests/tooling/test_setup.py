@@ -136,6 +136,18 @@ def test_the_set_up_says_how_far_it_is(environment: Path, bare_path: Path, tmp_p
     assert (done.returncode, done.stderr) == (0, "")
 
 
+def test_only_the_lock_of_the_project_puts_the_project_in(
+    environment: Path, bare_path: Path
+) -> None:
+    python, told = environment / "bin" / "python", environment / "told"
+    script(python, f'echo "$*" >> {told}; exit 0')
+    for lock, wanted in (("dev.txt", False), ("lock.txt", True)):
+        told.write_text("")
+        done = run_tool("setup.sh", str(environment), f"requirements/{lock}", path=bare_path)
+        assert done.returncode == 0, done.stderr
+        assert (" --editable ." in told.read_text()) == wanted
+
+
 def test_a_set_up_that_fails_says_why_and_ends_with_an_error(
     environment: Path, bare_path: Path, tmp_path: Path
 ) -> None:

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
@@ -184,12 +184,19 @@ def test_a_process_ends_though_an_address_answers_without_end(tmp_path: Path) ->
 
 
 class Drip(socketserver.ThreadingTCPServer):
-    """A server that answers with the same bytes again and again, without end."""
+    """A server that answers with the same bytes again and again, without end.
+
+    Args:
+        answer: the bytes.
+        begin: what it does with a new connection before; returns the bytes.
+    """
 
     daemon_threads = True
 
-    def __init__(self, answer: bytes = b"H") -> None:
-        self.answer = answer
+    def __init__(
+        self, answer: bytes = b"H", begin: Callable[[socket.socket], bytes] | None = None
+    ) -> None:
+        self.begin = begin or (lambda _: answer)
         super().__init__(("127.0.0.1", 0), _Dripping)
         self.asked = threading.Event()
         threading.Thread(target=self.serve_forever, daemon=True).start()
@@ -200,8 +207,9 @@ class _Dripping(socketserver.BaseRequestHandler):
         assert isinstance(self.server, Drip)
         self.server.asked.set()
         with contextlib.suppress(OSError):
+            answer = self.server.begin(self.request)
             while True:
-                self.request.sendall(self.server.answer)
+                self.request.sendall(answer)
                 time.sleep(0.05)
 
 

@@ -1,11 +1,14 @@
 """Heartbeats stop with the monitor; the endpoint shows the rig's figures."""
 
+import socket
 import ssl
 import threading
 import urllib.error
 import urllib.request
+from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -17,6 +20,8 @@ from rigwatch.wire.messages import ALARMS, ESTIMATES, HEALTH, EstimateBlock, Hea
 from rigwatch.wire.rig_config import SecuritySection, WitnessSection
 from rigwatch.witness import beats
 from rigwatch.witness.beats import Pinger
+from rigwatch.witness.bounded import MOST_HUNG
+from rigwatch.witness.cut_request import CutRequest
 from rigwatch.witness.metrics import MOST_SOURCES, Endpoint, Figures
 from rigwatch.witness.process import Witness
 from tests.access.secured_rig import make_keys
@@ -84,7 +89,7 @@ def test_beyond_loopback_the_endpoint_asks_for_a_certificate(tmp_path: Path) -> 
 
 
 class Switch(BaseHTTPRequestHandler):
-    hits: list[str]
+    hits: ClassVar[list[str]]
 
     def do_GET(self) -> None:
         self.hits.append(self.path)
@@ -156,3 +161,72 @@ def test_a_heartbeat_file_that_cannot_be_written_is_told_until_it_can(tmp_path: 
     text(3.0)
     assert text(4.0) == ""
     assert file.is_file()
+
+
+def drip_in_headers(_: socket.socket) -> bytes:
+    return b"H"
+
+
+def drip_in_a_redirection(request: socket.socket) -> bytes:
+    request.recv(1000)
+    head = b"HTTP/1.1 302 Found\r\nLocation: /elsewhere\r\nContent-Length: 1000000\r\n\r\n"
+    request.sendall(head)
+    return b"x"
+
+
+def drip_in_the_handshake(request: socket.socket) -> bytes:
+    request.recv(1000)
+    request.sendall(b"\x16\x03\x03\x40\x00")  # a record of 16 kB is announced
+    return b"\x02"
+
+
+@pytest.mark.parametrize(
+    ("scheme", "begin"),
+    [
+        ("http", drip_in_headers),
+        ("http", drip_in_a_redirection),
+        ("https", drip_in_the_handshake),
+    ],
+    ids=["headers", "redirection", "handshake"],
+)
+def test_pings_go_on_after_a_server_that_never_ended_its_answers(
+    scheme: str, begin: Callable[[socket.socket], bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(beats, "WHOLE", 0.2)
+    with Drip(begin=begin) as drip:
+        pinger = Pinger(f"{scheme}://127.0.0.1:{drip.server_address[1]}/", 1.0)
+        idle = pings()  # the threads of all pingers so far, each of which waits for its next ping
+        for count in range(1, MOST_HUNG + 3):
+            pinger.beat(float(count))
+            eventually(lambda wanted=count: pinger.failed == wanted, "the failure")
+            assert pinger.trouble.endswith("not finished within 0.2 s")
+            eventually(lambda: pings() == idle, "the request has ended")
+        drip.shutdown()
+
+
+def pings() -> int:
+    return sum(thread.name == "ping" for thread in threading.enumerate())
+
+
+def test_a_redirection_is_followed_and_a_refusal_is_told_by_its_number() -> None:
+    class Moved(Switch):
+        hits: ClassVar[list[str]] = []
+
+        def do_GET(self) -> None:
+            self.hits.append(self.path)
+            code = {"/old": 302, "/new": 200}.get(self.path, 404)
+            self.send_response(code)
+            self.send_header("Location", "/new")
+            self.end_headers()
+
+    server = HTTPServer(("127.0.0.1", 0), Moved)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    url = f"http://127.0.0.1:{server.server_port}"
+    assert CutRequest(f"{url}/old", 5.0).ask() == ""
+    assert Moved.hits == ["/old", "/new"]
+    assert CutRequest(f"{url}/gone", 5.0).ask() == "the server answers 404"
+    cut = CutRequest(f"{url}/new", 5.0)
+    cut.cut()
+    assert cut.ask() != ""
+    server.shutdown()
+    server.server_close()

@@ -5,11 +5,14 @@ import json
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from rigwatch.doctor import Finding, check_machine, check_rig, check_viewer
 from rigwatch.supervisor import PROCESSES
 from rigwatch.wire.errors import ConfigError, RigwatchError
 from rigwatch.wire.rig_config import load_rig
+
+if TYPE_CHECKING:
+    from rigwatch.doctor import Finding
 
 HELP = "check the installation, ports, devices and a configuration"
 EXAMPLE = """  rigwatch doctor
@@ -49,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 1 if any(finding.level == "fail" for finding in findings) else 0
 
 
-def _selected(arguments: argparse.Namespace) -> Iterator[Finding]:
+def _selected(arguments: argparse.Namespace) -> "Iterator[Finding]":
     if arguments.alive is None:
         if arguments.fix and arguments.config is None:
             raise ConfigError("rigwatch doctor", "--fix", "no CONFIG", "the rig's configuration")
@@ -57,12 +60,14 @@ def _selected(arguments: argparse.Namespace) -> Iterator[Finding]:
         return
     if arguments.config is None:
         raise ConfigError("rigwatch doctor", "--alive", "no CONFIG", "the rig's configuration")
-    from rigwatch.doctor import check_alive  # the bus is not needed otherwise
+    from rigwatch.doctor import check_alive
 
     yield check_alive(load_rig(arguments.config), arguments.alive)
 
 
-def _findings(config: Path | None, *, fix: bool) -> Iterator[Finding]:
+def _findings(config: Path | None, *, fix: bool) -> "Iterator[Finding]":
+    from rigwatch.doctor import check_machine, check_rig, check_viewer
+
     yield from check_machine(_recordings(config))
     yield from check_viewer()
     if config is not None:
@@ -78,6 +83,6 @@ def _recordings(config: Path | None) -> Path:
     return Path(recorder.folder if recorder is not None else "sessions")
 
 
-def _line(finding: Finding) -> str:
+def _line(finding: "Finding") -> str:
     remedy = f" -> {finding.remedy}" if finding.remedy else ""
     return f"{finding.level:4} {finding.what:24} {finding.text}{remedy}"

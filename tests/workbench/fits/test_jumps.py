@@ -11,6 +11,8 @@ from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.fit.discontinuities import MOST, away_from_jumps
 from tests.workbench.simulated import HORIZON, multisine, opened
 
+pytestmark = pytest.mark.long
+
 FORCE = multisine(np.arange(0.25, 8.0, 0.25), 1.0)
 
 
