@@ -63,6 +63,7 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
         "models. What was hidden and what it was called: [hidden effects](hidden-effects.md).",
         (
             "hidden_effects",
+            "held_inputs",
             "hidden_rivals",
             "chains",
             "hidden_effects_rig",

@@ -37,7 +37,8 @@ class Replay:
     """The result of a replay.
 
     Attributes:
-        samples: number of samples judged.
+        samples: number of samples passed to the monitor.
+        armed: number of them at which it was armed.
         first_ns, last_ns: times of the first and the last of them [ns].
         elapsed_s: duration of the replay [s].
         alarms: transitions, in order.
@@ -46,6 +47,7 @@ class Replay:
     """
 
     samples: int = 0
+    armed: int = 0
     first_ns: int = 0
     last_ns: int = 0
     elapsed_s: float = 0.0
@@ -59,6 +61,8 @@ class Replay:
             self.first_ns = self.first_ns if self.samples else int(judged.item.t_ns[0])
             self.last_ns = int(judged.item.t_ns[-1])
             self.samples += len(judged.item)
+        if judged.watched is not None:
+            self.armed += int(judged.watched.estimates.column("armed").values.sum())
         for announcement in judged.announced:
             if isinstance(announcement, Alarm):
                 self.alarms.append(announcement)

@@ -466,3 +466,15 @@ def test_only_the_missing_rows_of_a_uniform_recording_are_resampled(tmp_path: Pa
     marks = block.channel("position").quality
     assert np.flatnonzero(marks == quality.RESAMPLED).tolist() == [40, 41, 70]
     assert set(marks[kept]) == {quality.GOOD}
+
+
+def test_the_rate_beside_a_jump_of_the_clock_is_that_of_the_samples(tmp_path: Path) -> None:
+    """Steps of 1/256 s, written to the microsecond, are 3906 µs or 3907 µs."""
+    from rigwatch.wire.exchange.grid import fit_grid
+
+    at = np.arange(2048) / 256 + np.where(np.arange(2048) > 1000, 5.0, 0.0)
+    grid = fit_grid(np.round(at, 6), None, 2.0)
+
+    assert grid.rate_hz == 256.0
+    assert grid.own.sum() == 2048
+    assert grid.in_hole.sum() == 5 * 256

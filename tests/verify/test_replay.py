@@ -35,11 +35,24 @@ def test_alarms_and_summary(capsys: pytest.CaptureFixture[str]) -> None:
     assert "dry_friction" in lines[-1]
 
 
+def test_a_recording_too_short_to_arm_says_that_nothing_was_judged(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["replay", FRICTION, *MODEL, "--start", "0", "--end", "0.5"]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert "nothing was judged" in last
+    assert "replay a longer recording" in last
+
+    assert main(["replay", FRICTION, *MODEL, "--start", "0", "--end", "0.5", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["armed"] == 0
+
+
 def test_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", FRICTION, *MODEL, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["samples"] == 2048
     assert "dry_friction" in [alarm["name"] for alarm in found["alarms"]]
+    assert 0 < found["armed"] < found["samples"]
     assert found["lost"] == []
     assert found["times_real_time"] > 0
 

@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from rigwatch.replay import Replay
     from rigwatch.wire.messages import Alarm
 
+NEVER_ARMED = (
+    "nothing was judged: the monitor was never armed; replay a longer recording of steady motion"
+    " (it arms within two seconds of a motion that it knows, and learns others for some periods)"
+)
 HELP = "run the monitor over recordings, as fast as possible or at a given speed"
 EXAMPLE = """\
   rigwatch replay run.mcap --model model.toml
@@ -74,14 +78,14 @@ def judged(
     monitor = monitor_for(session, model, config)
     found = _as_data(replay(session, monitor, span_between(start, end, session)), None)
     raised = [alarm.name for alarm in found["alarms"] if alarm.state == "unacknowledged"]
-    kept = ("samples", "duration_s", "alarms", "events", "lost")
+    kept = ("samples", "armed", "duration_s", "alarms", "events", "lost")
     return {"raised": raised, "raised_count": len(raised)} | {name: found[name] for name in kept}
 
 
 def _line(found: dict[str, Any]) -> str:
     lost = f"; {len(found['lost'])} damaged part(s)" if found["lost"] else ""
     size = f"{found['samples']} samples, {found['duration_s']:.1f} s"
-    return f"{size}; {_alarms(found['raised'])}{lost}"
+    return f"{size}; {_alarms(found['raised'], found['armed'])}{lost}"
 
 
 def _run_one(arguments: argparse.Namespace, path: Path) -> int:
@@ -116,16 +120,21 @@ def _announce(alarm: "Alarm") -> None:
 def _summary(done: "Replay") -> str:
     raised = [alarm.name for alarm in done.alarms if alarm.state == "unacknowledged"]
     speed = f"{done.elapsed_s:.2f} s ({done.times_real_time:,.0f} × real time)"
-    return f"{done.samples} samples, {done.duration_s:.1f} s in {speed}; {_alarms(raised)}"
+    return (
+        f"{done.samples} samples, {done.duration_s:.1f} s in {speed}; {_alarms(raised, done.armed)}"
+    )
 
 
-def _alarms(raised: list[str]) -> str:
-    return f"alarms raised: {', '.join(raised)}" if raised else "no alarm was raised"
+def _alarms(raised: list[str], armed: int) -> str:
+    if raised:
+        return f"alarms raised: {', '.join(raised)}"
+    return "no alarm was raised" if armed else f"no alarm was raised, but {NEVER_ARMED}"
 
 
 def _as_data(done: "Replay", out: Path | None) -> dict[str, Any]:
     return {
         "samples": done.samples,
+        "armed": done.armed,
         "duration_s": done.duration_s,
         "elapsed_s": done.elapsed_s,
         "times_real_time": done.times_real_time,

@@ -68,7 +68,7 @@ def fit_grid(times: FloatArray, rate: float | None, max_hole: float) -> Grid:
     if _is_uniform(times, period):
         rate_hz = rate or _rounded((len(times) - 1) / span if span else 1 / period)
         return whole(rate_hz, times, extremes)
-    rate_hz = rate or _rounded(1 / period)
+    rate_hz = rate or _rounded(1 / _mean_step(steps, period))
     most = MOST_POINTS + MOST_PER_SAMPLE * len(times)
     if span * rate_hz > most:
         raise ImportDataError(_too_many(times, rate_hz))
@@ -128,6 +128,11 @@ def _is_uniform(times: FloatArray, period: float) -> bool:
     line = times[0] + np.arange(steps + 1) * (span / max(1, steps))
     mean_is_median = abs(span - steps * period) <= RATE_TOLERANCE * span
     return bool(np.abs(times - line).max() <= JITTER * period and mean_is_median)
+
+
+def _mean_step(steps: FloatArray, median: float) -> float:
+    """Mean of the steps without holes [s]: the median of rounded time stamps is rounded too."""
+    return float(steps[np.abs(steps - median) < 0.5 * median].mean())
 
 
 def _rounded(rate: float) -> float:

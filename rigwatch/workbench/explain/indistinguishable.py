@@ -15,7 +15,9 @@ from rigwatch.workbench.fit import block_differences
 from rigwatch.workbench.ranking import MUCH_WORSE, SAME, SIMILAR, Ranked
 
 EQUAL = 2.0
-"""Standard deviations of a paired difference below which two effects count as equal."""
+"""Standard deviations by which an effect must be ahead of another, block by block, to rule it out.
+An effect may be named for its parameters and be behind.
+"""
 NO_DIFFERENCE = 1e-4
 """Relative difference of errors that reflects only where two fits stopped."""
 PERHAPS = 1.0
@@ -165,14 +167,16 @@ def _is_simple_enough(best: Ranked, row: Ranked) -> bool:
 
 
 def equal(one: Ranked, other: Ranked, cosine: float) -> bool:
-    """Whether two have equal held-out errors; if one is not fitted, whether they are parallel."""
+    """Whether one is not better than another beyond chance, held out; if the other is not fitted,
+    whether they are parallel.
+    """
     if other.fitted is None:
         return cosine > SAME
     assert one.fitted is not None
     if not other.accepted:
         return False
     same = abs(other.held_out_error / one.held_out_error - 1) < NO_DIFFERENCE
-    return bool(same or abs(lead(one, other)) < EQUAL)
+    return bool(same or lead(one, other) < EQUAL)
 
 
 def lead(one: Ranked, other: Ranked) -> float:

@@ -11,6 +11,7 @@ from rigwatch.physics.engine.equations import Placement
 from rigwatch.physics.engine.fit import Fit
 from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.data import NoiseFloor
+from rigwatch.workbench.explain.indistinguishable import undistinguished
 from rigwatch.workbench.explain.sets.several_effects import with_similar
 from rigwatch.workbench.explain.verdict import Verdict, judge, not_converged
 from rigwatch.workbench.explain.verdict_calibration import CLEAR, probability_wrong
@@ -293,6 +294,15 @@ def test_a_refinement_of_what_is_in_the_class_is_not_named_beside_it() -> None:
     of_the_best = row("by_rate@drive", refines="offset")
     known.cosines["by_rate@drive"] = 1.0
     assert judge(base(), [known, of_the_best], PERIODS).members == ("offset@drive",)
+
+
+def test_an_effect_that_is_ahead_block_by_block_is_a_rival_of_the_one_that_is_named() -> None:
+    """The named one has the smaller error by a hair, which an average over samples may give."""
+    named = best("lag@acceleration_sensor", error=1.0306)
+    ahead = row("lag@drive", 1.0306, behind=-3.0, cosines={named.label: 0.95})
+    named.cosines[ahead.label] = 0.95
+
+    assert undistinguished(named, [named, ahead], trusted=True)[1] == ("lag@drive",)
 
 
 def test_errors_that_differ_by_where_the_fits_stopped_are_equal() -> None:
