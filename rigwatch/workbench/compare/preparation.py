@@ -105,7 +105,13 @@ def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench
     base = fit_base(study, data, scale)
     healthy = data.of_healthy
     if healthy is None:
-        floor = from_residual(base.held_out, data.held_out, study.file.period, data.horizon)
+        floor = from_residual(
+            base.held_out,
+            data.held_out,
+            study.file.period,
+            data.horizon,
+            at_once=not study.model.states,
+        )
         return Bench(study, data, base, floor, None)
     bare = fit_model(study, healthy, (), study.file.start, base.train.scale, multi_start=True)
     return Bench(study, data, base, _of_healthy(study, data, healthy, base, bare), bare)

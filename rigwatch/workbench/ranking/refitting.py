@@ -123,7 +123,14 @@ def own_floor(study: Study, data: Data, floor: NoiseFloor, row: Ranked) -> Noise
     """
     assert row.fitted is not None
     fitted, recording = row.fitted.held_out, data.held_out
-    return lowered(floor, fitted, recording, study.file.period, data.horizon)
+    return lowered(
+        floor,
+        fitted,
+        recording,
+        study.file.period,
+        data.horizon,
+        at_once=not study.model.states,
+    )
 
 
 def _is_unlike(row: Ranked, other: Ranked) -> bool:

@@ -11,6 +11,7 @@ from rigwatch.physics.engine.equations import Placement
 from rigwatch.physics.engine.fit import Fit
 from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.data import NoiseFloor
+from rigwatch.workbench.explain.remaining_error import remaining_share
 from rigwatch.workbench.explain.sets.several_effects import with_similar
 from rigwatch.workbench.explain.verdict import Verdict, judge, not_converged
 from rigwatch.workbench.explain.verdict_calibration import CLEAR, probability_wrong
@@ -169,6 +170,8 @@ def test_an_effect_that_leaves_most_is_not_the_answer() -> None:
         "; 38% of the error's energy remains, 2 times the noise floor"
     )
     assert judge(base(3.0), [best(error=2.0)], QUIET).word == "missing_effect"
+    assert remaining_share(base(3.0), best(error=2.0), QUIET) == pytest.approx(0.375)
+    assert remaining_share(base(3.0), best(error=1.0), QUIET) == 0.0
     assert judge(base(3.0), [best(error=2.7)], QUIET).word == "unknown_effect"
 
 

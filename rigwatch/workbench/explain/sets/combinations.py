@@ -84,8 +84,14 @@ def floor_of(bench: Bench, fitted: Fitted) -> NoiseFloor:
     """
     if bench.data.of_healthy is not None or bench.floor.method != "quiet band":
         return bench.floor
-    period = bench.study.file.period
-    return from_residual(fitted.held_out, bench.data.held_out, period, bench.data.horizon)
+    study, data = bench.study, bench.data
+    return from_residual(
+        fitted.held_out,
+        data.held_out,
+        study.file.period,
+        data.horizon,
+        at_once=not study.model.states,
+    )
 
 
 def reaches_noise(bench: Bench, fitted: Fitted) -> bool:
