@@ -34,7 +34,7 @@ from rigwatch.workbench.explain.remaining_error import (
 )
 from rigwatch.workbench.explain.verdict_calibration import CLEAR, Evidence, probability_wrong
 from rigwatch.workbench.fit import Fitted
-from rigwatch.workbench.ranking import Ranked
+from rigwatch.workbench.ranking import MATERIAL, Ranked
 
 Word = Literal[
     "nothing_missing", "missing_effect", "undetermined", "unknown_effect", "model_inadequate"
@@ -96,6 +96,8 @@ def not_converged(fits: Mapping[str, Convergence | None]) -> Verdict | None:
 
 def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
     """The verdict on a ranking; `floor` is the noise floor of the held-out recordings."""
+    if floor.lower_limit and floor.reached(base.held_out):
+        _refuse_what_hardly_trains(base, rows)
     accepted = [row for row in rows if row.accepted]
     if not accepted:
         return _nothing_found(base, rows, floor)
@@ -131,6 +133,22 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
         text = f"the best known effect, {best.label}, leaves nearly all of the training error"
     text += remaining_error(base, best, floor) + other_accepted(rows, (*members, *rivals))
     return Verdict(word, best, members, rivals, text, evidence=evidence)
+
+
+def _refuse_what_hardly_trains(base: Fitted, rows: Sequence[Ranked]) -> None:
+    """Refuse what hardly lowers the training error where only noise is to be explained.
+
+    What is left there may still repeat, as at the reversals of a cyclic test, and an effect that
+    follows it in one recording lowers the error held out without being there.
+    """
+    for row in rows:
+        if row.accepted and row.fitted is not None:
+            fall = 1 - row.fitted.train_error / max(base.train_error, 1e-300)
+            if fall < MATERIAL:
+                row.accepted = False
+                row.reason = (
+                    f"at the noise floor, and training error falls by less than {MATERIAL:.0%}"
+                )
 
 
 def _explaining_training(base: Fitted, best: Ranked, rows: Sequence[Ranked]) -> tuple[str, ...]:

@@ -95,6 +95,23 @@ def test_nothing_is_missing_where_the_error_is_noise() -> None:
     assert found == Verdict("nothing_missing", None, (), (), text)
 
 
+@pytest.mark.parametrize(
+    ("error", "training", "word"),
+    [
+        pytest.param(1.15, 1.12, "nothing_missing", id="hardly trains"),
+        pytest.param(1.15, 1.08, "missing_effect", id="trains"),
+    ],
+)
+def test_at_the_noise_floor_the_training_error_must_fall_too(
+    error: float, training: float, word: str
+) -> None:
+    named = best(error=error - 0.05)
+    assert named.fitted is not None
+    named.fitted = replace(named.fitted, train=base(training).train)
+    assert judge(base(error), [named], QUIET).word == word
+    assert named.accepted == (word == "missing_effect")
+
+
 def test_what_no_effect_lowers_is_unknown() -> None:
     found = judge(base(2.0), [], PERIODS)
     text = "the held-out error is 2.00 times the noise floor, and no known effect lowers it"
