@@ -1,0 +1,102 @@
+"""Effects that other recordings speak for than those held out, where much remains unexplained.
+
+Where several effects are missing, the few recordings held out may favour another than the training.
+What leads there is then not named with confidence.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigwatch.workbench.data import NoiseFloor
+from rigwatch.workbench.explain.indistinguishable import same_family
+from rigwatch.workbench.explain.remaining_error import LITTLE, explains
+from rigwatch.workbench.fit import Fitted
+from rigwatch.workbench.ranking import STEP, Ranked, difference
+
+CONTRADICTED = 2.0
+"""Ratio of the training energy explained by another effect above which the best is in doubt."""
+FAVOURED = 1.25
+"""The same where what is held out cannot tell the two apart, and the best leaves much of both."""
+
+
+def explaining_training(base: Fitted, best: Ranked, rows: Sequence[Ranked]) -> tuple[str, ...]:
+    """Labels of effects that lower both errors and explain far more of the training than the best.
+
+    Training and held-out recordings then disagree on what is missing, as where several effects are
+    and one of them happens to matter in the recordings held out.
+    """
+    assert best.fitted is not None
+    least = CONTRADICTED * max(base.train_error**2 - best.fitted.train_error**2, 0.0)
+    return tuple(
+        row.label
+        for row in rows
+        if row is not best
+        and row.fitted is not None
+        and row.held_out_error < base.held_out_error
+        and base.train_error**2 - row.fitted.train_error**2 > least
+    )
+
+
+def explaining_all(
+    base: Fitted, best: Ranked, rows: Sequence[Ranked], floor: NoiseFloor
+) -> tuple[str, ...]:
+    """Labels of accepted effects, no less simple, that leave less of all recordings than the best.
+
+    While much remains, that one effect leads on the few recordings held out and another on all of
+    them is chance: what is missing beside them may favour either. Members of the best's class, and
+    those that lead on both and are passed over for a simpler effect, are no such rivals.
+    """
+    assert best.fitted is not None
+    if explains(base, best, floor):
+        return ()
+    least = energy_of_all(best.fitted)
+    return tuple(
+        row.label
+        for row in rows
+        if row is not best
+        and row.accepted
+        and row.fitted is not None
+        and row.free <= best.free
+        and row.held_out_error >= best.held_out_error
+        and row.label not in best.alike
+        and not same_family(best, row)
+        and energy_of_all(row.fitted) < least
+    )
+
+
+def favoured_by_training(
+    base: Fitted, best: Ranked, rows: Sequence[Ranked], floor: NoiseFloor
+) -> tuple[str, ...]:
+    """Labels of effects, no less simple, that explain more of the training than the best.
+
+    Asked where the best leaves a third of both errors. A large part of what moves the held-out
+    recordings is then something else, which may raise the error of the right effect there. What is
+    held out must not speak for the best beyond chance.
+    """
+    assert best.fitted is not None
+    after = best.fitted
+    sides = ((base.held_out, after.held_out), (base.train, after.train))
+    if min(floor.left_over(*side) for side in sides) < LITTLE:
+        return ()
+    least = FAVOURED * max(base.train_error**2 - after.train_error**2, 0.0)
+    return tuple(
+        row.label
+        for row in rows
+        if row is not best
+        and row.fitted is not None
+        and row.free <= best.free
+        and row.label not in best.alike
+        and not same_family(best, row)
+        and base.train_error**2 - row.fitted.train_error**2 > least
+        and difference(after.train, row.fitted.train).p_falls < STEP
+        and difference(after.held_out, row.fitted.held_out).p_rises >= STEP
+    )
+
+
+def energy_of_all(fitted: Fitted) -> float:
+    """Sum of the scaled squares of all residuals, of the training and of what is held out."""
+    return sum(
+        float(np.nansum(np.square(side.residuals / side.scale)))
+        for side in (fitted.train, fitted.held_out)
+    )
