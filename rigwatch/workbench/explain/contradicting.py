@@ -12,12 +12,15 @@ from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.explain.indistinguishable import same_family
 from rigwatch.workbench.explain.remaining_error import LITTLE, explains
 from rigwatch.workbench.fit import Fitted
-from rigwatch.workbench.ranking import STEP, Ranked, difference
+from rigwatch.workbench.ranking import MATERIAL, Ranked, difference
 
 CONTRADICTED = 2.0
 """Ratio of the training energy explained by another effect above which the best is in doubt."""
 FAVOURED = 1.25
 """The same where what is held out cannot tell the two apart, and the best leaves much of both."""
+REFUTED = 5e-3
+"""p-value of a rise of the held-out error below which it tells an effect from the best; eight
+blocks of one sign, the fewest of the test, reach it."""
 
 
 def explaining_training(base: Fitted, best: Ranked, rows: Sequence[Ranked]) -> tuple[str, ...]:
@@ -72,7 +75,8 @@ def favoured_by_training(
 
     Asked where the best leaves a third of both errors. A large part of what moves the held-out
     recordings is then something else, which may raise the error of the right effect there. What is
-    held out must not speak for the best beyond chance.
+    held out must not speak for the best far beyond chance: with the rest unexplained and many
+    effects compared, the usual level is no evidence.
     """
     assert best.fitted is not None
     after = best.fitted
@@ -88,9 +92,9 @@ def favoured_by_training(
         and row.free <= best.free
         and row.label not in best.alike
         and not same_family(best, row)
+        and row.fitted.train_error <= (1 - MATERIAL) * base.train_error
         and base.train_error**2 - row.fitted.train_error**2 > least
-        and difference(after.train, row.fitted.train).p_falls < STEP
-        and difference(after.held_out, row.fitted.held_out).p_rises >= STEP
+        and difference(after.held_out, row.fitted.held_out).p_rises >= REFUTED
     )
 
 

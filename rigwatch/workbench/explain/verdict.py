@@ -131,15 +131,15 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
             f"{best.label} lowers the held-out error most, but {', '.join(better)} explains more of"
             " all recordings together"
         )
+    elif word == "missing_effect" and hardly_trains(base, best, floor):
+        word = "unknown_effect"
+        text = f"the best known effect, {best.label}, leaves nearly all of the training error"
     elif word == "missing_effect" and (others := favoured_by_training(base, best, rows, floor)):
         word, rivals = "undetermined", others
         text = (
             f"{best.label} lowers the held-out error most, but {', '.join(others)} explains more of"
             " the training error, and what is held out cannot tell them apart"
         )
-    elif word == "missing_effect" and hardly_trains(base, best, floor):
-        word = "unknown_effect"
-        text = f"the best known effect, {best.label}, leaves nearly all of the training error"
     text += remaining_error(base, best, floor) + other_accepted(rows, (*members, *rivals))
     return Verdict(word, best, members, rivals, text, evidence=evidence)
 
