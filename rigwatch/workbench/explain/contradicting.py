@@ -18,6 +18,8 @@ CONTRADICTED = 2.0
 """Ratio of the training energy explained by another effect above which the best is in doubt."""
 FAVOURED = 1.25
 """The same where what is held out cannot tell the two apart, and the best leaves much of both."""
+HALF = 0.5
+"""Share of the training's energy above which one that explains more of it is a rival."""
 REFUTED = 5e-3
 """p-value of a rise of the held-out error below which it tells an effect from the best; eight
 blocks of one sign, the fewest of the test, reach it."""
@@ -73,29 +75,39 @@ def favoured_by_training(
 ) -> tuple[str, ...]:
     """Labels of effects, no less simple, that explain more of the training than the best.
 
-    Asked where the best leaves a third of both errors. A large part of what moves the held-out
-    recordings is then something else, which may raise the error of the right effect there. What is
-    held out must not speak for the best far beyond chance: with the rest unexplained and many
-    effects compared, the usual level is no evidence.
+    Asked where the best leaves much: what moves the held-out recordings is then also something
+    else, which may favour a wrong effect there. Where it leaves half of the training, these are
+    accepted effects. Where it leaves a third of both errors they need not be, as the rest may raise
+    the error of the right effect, but must explain clearly more, and what is held out must not
+    speak for the best far beyond chance: many effects are compared.
     """
     assert best.fitted is not None
     after = best.fitted
-    sides = ((base.held_out, after.held_out), (base.train, after.train))
-    if min(floor.left_over(*side) for side in sides) < LITTLE:
+    if floor.reached(after.held_out):
         return ()
-    least = FAVOURED * max(base.train_error**2 - after.train_error**2, 0.0)
-    return tuple(
-        row.label
-        for row in rows
-        if row is not best
-        and row.fitted is not None
-        and row.free <= best.free
-        and row.label not in best.alike
-        and not same_family(best, row)
-        and row.fitted.train_error <= (1 - MATERIAL) * base.train_error
-        and base.train_error**2 - row.fitted.train_error**2 > least
-        and difference(after.held_out, row.fitted.held_out).p_rises >= REFUTED
+    held_out, train = (
+        floor.left_over(*side)
+        for side in ((base.held_out, after.held_out), (base.train, after.train))
     )
+    gain = max(base.train_error**2 - after.train_error**2, 0.0)
+
+    def favoured(row: Ranked) -> bool:
+        fitted = row.fitted
+        if fitted is None or fitted.train_error > (1 - MATERIAL) * base.train_error:
+            return False
+        more = base.train_error**2 - fitted.train_error**2
+        if row.accepted and train > HALF and more > gain:
+            return True
+        much = min(held_out, train) >= LITTLE and more > FAVOURED * gain
+        return much and difference(after.held_out, fitted.held_out).p_rises >= REFUTED
+
+    return tuple(row.label for row in rows if _is_another(best, row) and favoured(row))
+
+
+def _is_another(best: Ranked, row: Ranked) -> bool:
+    """Whether it is an effect of other physics, no less simple than the best."""
+    alike = row is best or row.label in best.alike or same_family(best, row)
+    return not alike and row.free <= best.free
 
 
 def energy_of_all(fitted: Fitted) -> float:

@@ -138,7 +138,7 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
         word, rivals = "undetermined", others
         text = (
             f"{best.label} lowers the held-out error most, but {', '.join(others)} explains more of"
-            " the training error, and what is held out cannot tell them apart"
+            f" the training error, much of which {best.label} leaves"
         )
     text += remaining_error(base, best, floor) + other_accepted(rows, (*members, *rivals))
     return Verdict(word, best, members, rivals, text, evidence=evidence)

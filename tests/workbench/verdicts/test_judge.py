@@ -229,14 +229,18 @@ def test_an_effect_that_leads_on_the_recordings_held_out_alone_is_not_named(
         pytest.param(2.4, 2.55, {"uneven": 5.0}, "missing_effect", id="hardly more of training"),
         pytest.param(2.4, 2.4, {"uneven": 5.0, "free": 2}, "missing_effect", id="less simple"),
         pytest.param(1.6, 2.4, {"uneven": 2.5}, "missing_effect", id="little is left"),
+        pytest.param(1.6, 2.5, {"uneven": 0.0, "accepted": True}, "undetermined", id="accepted"),
+        pytest.param(1.2, 2.5, {"uneven": 0.0, "accepted": True}, "missing_effect", id="at noise"),
     ],
 )
 def test_an_effect_that_leaves_much_gives_way_to_one_that_the_training_favours(
     held_out: float, training: float, other: dict[str, Any], word: str
 ) -> None:
     only = trained(best(error=held_out, cosines={"b@x": 0.3}), 2.6)
-    rival = row("b@x", accepted=False, free=other.get("free", 1))
-    error = (held_out + 0.2) ** 2 + other["uneven"] * np.repeat([1.0, -1.0, 1.0, -1.0], 10)
+    rival = row("b@x", accepted=other.get("accepted", False), free=other.get("free", 1))
+    error = (held_out + 0.4 * rival.accepted + 0.2) ** 2 + other["uneven"] * np.repeat(
+        [1.0, -1.0, 1.0, -1.0], 10
+    )
     rival.fitted = replace(leaving(error), train=base(training).train)
     found = judge(replace(base(), train=base(2.9).train), [only, rival], QUIET)
     assert found.word == word
