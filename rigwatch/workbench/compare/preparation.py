@@ -18,6 +18,7 @@ from rigwatch.workbench.data import (
     predicts_along_motion,
     prepare,
     quiet_scale,
+    repeats_at_once,
     with_elements,
 )
 from rigwatch.workbench.fit import (
@@ -110,7 +111,7 @@ def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench
             data.held_out,
             study.file.period,
             data.horizon,
-            at_once=not study.model.states,
+            at_once=repeats_at_once(study),
         )
         return Bench(study, data, base, floor, None)
     bare = fit_model(study, healthy, (), study.file.start, base.train.scale, multi_start=True)

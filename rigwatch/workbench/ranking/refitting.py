@@ -7,7 +7,7 @@ from typing import Any
 from rigwatch.physics.engine.compile import cores, side_by_side
 from rigwatch.physics.engine.equations import Placement
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.data import Data, NoiseFloor, lowered
+from rigwatch.workbench.data import Data, NoiseFloor, lowered, repeats_at_once
 from rigwatch.workbench.fit import (
     Fitted,
     fit_model,
@@ -129,7 +129,7 @@ def own_floor(study: Study, data: Data, floor: NoiseFloor, row: Ranked) -> Noise
         recording,
         study.file.period,
         data.horizon,
-        at_once=not study.model.states,
+        at_once=repeats_at_once(study),
     )
 
 

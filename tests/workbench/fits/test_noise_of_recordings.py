@@ -16,9 +16,11 @@ from rigwatch.workbench.data.noise.noise_floor import (
     find_period,
     from_residual,
     quiet_scale,
+    repeats_at_once,
 )
 from rigwatch.workbench.data.noise.quietest_band import quietest_band
 from rigwatch.workbench.data.repeats import repeat_of
+from rigwatch.workbench.study import Study
 
 NOISE, RATE = 1e-3, 200.0
 
@@ -124,3 +126,16 @@ def test_a_triangle_that_repeats_only_nearly_tells_nothing_of_the_noise() -> Non
     assert (
         from_residual(fitted, recording, 0.0, len(recording), at_once=True).method == "quiet band"
     )
+
+
+@pytest.mark.parametrize(
+    ("states", "effects", "counts"), [(0, 1, True), (0, 0, False), (1, 1, False)]
+)
+def test_repeats_count_from_the_second_step_on_for_outputs_that_follow_at_once(
+    states: int, effects: int, *, counts: bool
+) -> None:
+    study = SimpleNamespace(
+        model=SimpleNamespace(states={"x": None} if states else {}),
+        file=SimpleNamespace(effects=[None] * effects),
+    )
+    assert repeats_at_once(cast("Study", study)) == counts

@@ -17,6 +17,7 @@ from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.workbench.data.noise.error_spectrum import ErrorSpectrum
 from rigwatch.workbench.data.noise.quietest_band import quietest_band
 from rigwatch.workbench.data.noise.unrepeated import unrepeated
+from rigwatch.workbench.study import Study
 
 METHODS = {
     "periods": "differences between repeated periods of the excitation",
@@ -141,6 +142,19 @@ def from_residual(
     if own is not None and np.all(own[0] < quiet):
         return NoiseFloor(own[0], "repeats", own[1])
     return NoiseFloor(np.array(quiet), "quiet band", max(chances))
+
+
+def repeats_at_once(study: Study) -> bool:
+    """Whether what repeats with the excitation counts as left by a wrong model.
+
+    The outputs must follow from the inputs at once. Before an effect is accepted it does not count:
+    laws that share what is missing, such as two kinds of hysteresis, would stay rivals for what is
+    little beside it.
+
+    Args:
+        study: its model and accepted effects.
+    """
+    return not study.model.states and bool(study.file.effects)
 
 
 def lowered(

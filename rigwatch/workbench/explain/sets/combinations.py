@@ -16,7 +16,7 @@ from rigwatch.physics.engine.compile import side_by_side
 from rigwatch.physics.engine.fit import Fit
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
-from rigwatch.workbench.data import NoiseFloor, from_residual
+from rigwatch.workbench.data import NoiseFloor, from_residual, repeats_at_once
 from rigwatch.workbench.explain.verdict import LITTLE_MORE
 from rigwatch.workbench.fit import Fitted, continued_train_error, fit_model
 from rigwatch.workbench.ranking import (
@@ -90,7 +90,7 @@ def floor_of(bench: Bench, fitted: Fitted) -> NoiseFloor:
         data.held_out,
         study.file.period,
         data.horizon,
-        at_once=not study.model.states,
+        at_once=repeats_at_once(study),
     )
 
 
