@@ -11,6 +11,11 @@ EXAMPLE = """\
   rigwatch explain emps
   rigwatch explain 'studies/*' --on local:4 --results verdicts.jsonl"""
 
+RARER = (
+    "{count} rarer effects have not been tried: write whole_library = true as the first line of"
+    " {file}, then: rigwatch explain {study}"
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
@@ -39,11 +44,16 @@ def _line(found: dict[str, Any]) -> str:
 
 def _run_one(arguments: argparse.Namespace, folder: Path) -> int:
     from rigwatch.workbench.explain import as_data, explain
+    from rigwatch.workbench.ranking import suitable
     from rigwatch.workbench.report import explanation_lines, next_command
     from rigwatch.workbench.study import open_study
 
-    found = explain(open_study(folder), progress=say)
-    command = next_command(found, f"{folder}")
-    lines = [*explanation_lines(found), *([f"next: {command}"] if command else [])]
+    study = open_study(folder)
+    found = explain(study, progress=say)
+    following = next_command(found, f"{folder}")
+    _, elective = suitable(study)
+    if found.verdict == "unknown_effect" and elective:
+        following = RARER.format(count=len(elective), file=folder / "study.toml", study=folder)
+    lines = [*explanation_lines(found), *([f"next: {following}"] if following else [])]
     print_result(arguments, as_data(found), lines)
     return 0

@@ -59,6 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """0 if it is written."""
+    from rigwatch.workbench.ranking import suitable
     from rigwatch.workbench.steps import study_from_logs
     from rigwatch.workbench.study import create, ledger
 
@@ -74,7 +75,9 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"{study.folder}: model {study.model.name}: {study.model.summary}")
     for remark in remarks:
         say(remark)
-    print(f"  {len(study.effects)} effects may be tried; next: rigwatch explain {study.folder}")
+    tried, elective = suitable(study)
+    rarer = f", {len(elective)} rarer ones with whole_library = true" if elective else ""
+    print(f"  {len(tried)} effects suit its ports{rarer}; next: rigwatch explain {study.folder}")
     return 0
 
 

@@ -12,6 +12,7 @@ from rigwatch.workbench.data.noise import (
     from_residual,
     lowered,
     quiet_scale,
+    repeats_at_once,
 )
 from rigwatch.workbench.data.one_rate import ALIKE as RATES_ALIKE
 from rigwatch.workbench.data.proposals import (
@@ -51,6 +52,7 @@ __all__ = [
     "read_columns",
     "repeat_along_motion",
     "repeat_of",
+    "repeats_at_once",
     "unchanging",
     "with_elements",
     "with_next_rows",

@@ -7,6 +7,7 @@ from rigwatch.workbench.compare import Bench, Comparison, added_variances, compa
 from rigwatch.workbench.experiment import Experiment, propose
 from rigwatch.workbench.explain.adequacy import uncalibrated
 from rigwatch.workbench.explain.exchange import Exchange
+from rigwatch.workbench.explain.remaining_error import remaining_share, shows_little_of_it
 from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.explain.verdict_calibration import (
     LATER_COUNTS,
@@ -71,6 +72,8 @@ class Explanation:
             comparison's `told_in`.
         wrong_at_most: upper bound of that probability, 95 %; None as above.
         unlike: why no simulated case is like this one, in words; empty if some are.
+        remains: share of the error's energy above the noise floor that a missing effect leaves, so
+            that more is missing; 0 if it, or the set that it was judged in, explains the error.
         exchange: an effect that describes the last accepted one better, if nothing beside it
             explains the error; None if none does, or if that was not asked.
     """
@@ -89,6 +92,7 @@ class Explanation:
     exchange: Exchange | None = None
     wrong_at_most: float | None = None
     unlike: str = ""
+    remains: float = 0.0
 
 
 def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanation:
@@ -108,7 +112,7 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
     listed = [
         _row(row, members, more) if row is verdict.best else _row(row, row.alike) for row in rows
     ]
-    unlike = "; ".join(uncalibrated(bench))
+    unlike = "; ".join([*uncalibrated(bench), *_unlike_training(bench, verdict)])
     probability, similar = _reliability(bench, verdict)
     most = None if unlike else most_probably_wrong(*similar)
     return Explanation(
@@ -125,7 +129,27 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         compared.unit,
         wrong_at_most=most,
         unlike=unlike,
+        remains=_remains(bench, verdict),
     )
+
+
+def _unlike_training(bench: Bench, verdict: Verdict) -> list[str]:
+    """That the held-out recordings show less of what is missing than the training, in words."""
+    best = verdict.best if verdict.word in STRENGTH_TOLD else None
+    if best is None or best.fitted is None or verdict.beside or verdict.second:
+        return []
+    if not shows_little_of_it(bench.base, best, bench.floor):
+        return []
+    share = remaining_share(bench.base, best, bench.floor)
+    return [f"the held-out recordings show less than the training, which keeps {share:.0%}"]
+
+
+def _remains(bench: Bench, verdict: Verdict) -> float:
+    """Share of the error's energy that the effect named leaves, 0 beside a set that explains it."""
+    best = verdict.best if verdict.word == "missing_effect" else None
+    if best is None or best.fitted is None or verdict.beside or verdict.second:
+        return 0.0
+    return remaining_share(bench.base, best, bench.floor)
 
 
 def _reliability(bench: Bench, verdict: Verdict) -> tuple[float | None, tuple[int, int]]:

@@ -29,7 +29,7 @@ def explains_little(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
 
     The quietest band is a lower limit of the noise, so more of the error may remain above it.
     """
-    if floor.method != "quiet band":
+    if not floor.lower_limit:
         return not explains(base, row, floor)
     return left_over(base, row, floor, tolerant=True) > 1 - LITTLE
 
@@ -42,19 +42,58 @@ def hardly_trains(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
     """
     assert row.fitted is not None
     after = row.fitted.train
-    if floor.method != "quiet band" or floor.reached(after):
+    if not floor.lower_limit or floor.reached(after):
         return False
     return floor.left_over(base.train, after) > 1 - LITTLE_IN_TRAINING
+
+
+def remaining_share(base: Fitted, row: Ranked, floor: NoiseFloor) -> float:
+    """Share of the error's energy above the floor that an effect leaves, held out or in training.
+
+    Returns:
+        The larger of both; 0 if it explains both errors.
+    """
+    return max(_remaining_held_out(base, row, floor), _remaining_in_training(base, row, floor))
+
+
+def shows_little_of_it(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
+    """Whether an effect explains the held-out error, but not that of the training.
+
+    The held-out recordings then move the machine so that what else is missing hardly shows, or
+    looks like the effect.
+    """
+    held_out = _remaining_held_out(base, row, floor)
+    return not held_out and _remaining_in_training(base, row, floor) > 0.0
 
 
 def remaining_error(base: Fitted, row: Ranked, floor: NoiseFloor) -> str:
     """The error that an effect leaves above the floor, in words; empty at the noise floor."""
     assert row.fitted is not None
+    text = ""
+    for share, of, fitted in (
+        (_remaining_held_out(base, row, floor), "error", row.fitted.held_out),
+        (_remaining_in_training(base, row, floor), "training error", row.fitted.train),
+    ):
+        if share and not text:
+            times = floor.ratio(fitted)
+            text += f"; {share:.0%} of the {of}'s energy remains, {times:.2g} times the noise floor"
+    return text
+
+
+def _remaining_held_out(base: Fitted, row: Ranked, floor: NoiseFloor) -> float:
+    assert row.fitted is not None
     if floor.reached(row.fitted.held_out) or explains(base, row, floor):
-        return ""
-    share = left_over(base, row, floor)
-    times = floor.ratio(row.fitted.held_out)
-    return f"; {share:.0%} of the error's energy remains, {times:.2g} times the noise floor"
+        return 0.0
+    return left_over(base, row, floor)
+
+
+def _remaining_in_training(base: Fitted, row: Ranked, floor: NoiseFloor) -> float:
+    """The same of the training; its noise is taken to be that of the held-out recordings."""
+    assert row.fitted is not None
+    if floor.method == "healthy motion" or floor.reached(row.fitted.train):
+        return 0.0
+    share = floor.left_over(base.train, row.fitted.train)
+    return share if share > 1 - EXPLAINED else 0.0
 
 
 def other_accepted(rows: Sequence[Ranked], named: Sequence[str]) -> str:

@@ -13,10 +13,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-import numpy as np
-
 from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.data import NoiseFloor
+from rigwatch.workbench.explain.contradicting import (
+    CONTRADICTED,
+    energy_of_all,
+    explaining_all,
+    explaining_training,
+    favoured_by_training,
+)
 from rigwatch.workbench.explain.indistinguishable import (
     as_near_as_own_error,
     at_other_ports,
@@ -34,15 +39,13 @@ from rigwatch.workbench.explain.remaining_error import (
 )
 from rigwatch.workbench.explain.verdict_calibration import CLEAR, Evidence, probability_wrong
 from rigwatch.workbench.fit import Fitted
-from rigwatch.workbench.ranking import Ranked
+from rigwatch.workbench.ranking import MATERIAL, Ranked
 
 Word = Literal[
     "nothing_missing", "missing_effect", "undetermined", "unknown_effect", "model_inadequate"
 ]
 LITTLE_MORE = 0.01
 """Relative difference of errors too small to justify a further parameter above the noise floor."""
-CONTRADICTED = 2.0
-"""Ratio of the training energy explained by another effect above which the best is in doubt."""
 CHANCE = 0.05
 """p-value of the best effect from which coloured noise explains the error as well."""
 MOST_OF_IT = 0.75
@@ -96,6 +99,8 @@ def not_converged(fits: Mapping[str, Convergence | None]) -> Verdict | None:
 
 def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
     """The verdict on a ranking; `floor` is the noise floor of the held-out recordings."""
+    if floor.lower_limit and floor.reached(base.held_out):
+        _refuse_what_hardly_trains(base, rows)
     accepted = [row for row in rows if row.accepted]
     if not accepted:
         return _nothing_found(base, rows, floor)
@@ -113,14 +118,14 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
         floor.left_over(base.held_out, best.fitted.held_out), _margin(best, rows, members + rivals)
     )
     word, text = _word(base, best, rivals, floor)
-    elsewhere = () if trusted else _explaining_training(base, best, rows)
+    elsewhere = () if trusted else explaining_training(base, best, rows)
     if word == "missing_effect" and elsewhere:
         word, rivals = "undetermined", elsewhere
         text = (
             f"{best.label} lowers the held-out error most, but {', '.join(elsewhere)} explains more"
             f" than {CONTRADICTED:g} times as much of the training error"
         )
-    elif word == "missing_effect" and (better := _explaining_all(base, best, rows, floor)):
+    elif word == "missing_effect" and (better := explaining_all(base, best, rows, floor)):
         word, rivals = "undetermined", better
         text = (
             f"{best.label} lowers the held-out error most, but {', '.join(better)} explains more of"
@@ -129,61 +134,30 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
     elif word == "missing_effect" and hardly_trains(base, best, floor):
         word = "unknown_effect"
         text = f"the best known effect, {best.label}, leaves nearly all of the training error"
+    elif word == "missing_effect" and (others := favoured_by_training(base, best, rows, floor)):
+        word, rivals = "undetermined", others
+        text = (
+            f"{best.label} lowers the held-out error most, but {', '.join(others)} explains more of"
+            f" the training error, much of which {best.label} leaves"
+        )
     text += remaining_error(base, best, floor) + other_accepted(rows, (*members, *rivals))
     return Verdict(word, best, members, rivals, text, evidence=evidence)
 
 
-def _explaining_training(base: Fitted, best: Ranked, rows: Sequence[Ranked]) -> tuple[str, ...]:
-    """Labels of effects that lower both errors and explain far more of the training than the best.
+def _refuse_what_hardly_trains(base: Fitted, rows: Sequence[Ranked]) -> None:
+    """Refuse what hardly lowers the training error where only noise is to be explained.
 
-    Training and held-out recordings then disagree on what is missing, as where several effects are
-    and one of them happens to matter in the recordings held out.
+    What is left there may still repeat, as at the reversals of a cyclic test, and an effect that
+    follows it in one recording lowers the error held out without being there.
     """
-    assert best.fitted is not None
-    least = CONTRADICTED * max(base.train_error**2 - best.fitted.train_error**2, 0.0)
-    return tuple(
-        row.label
-        for row in rows
-        if row is not best
-        and row.fitted is not None
-        and row.held_out_error < base.held_out_error
-        and base.train_error**2 - row.fitted.train_error**2 > least
-    )
-
-
-def _explaining_all(
-    base: Fitted, best: Ranked, rows: Sequence[Ranked], floor: NoiseFloor
-) -> tuple[str, ...]:
-    """Labels of accepted effects, no less simple, that leave less of all recordings than the best.
-
-    While much remains, that one effect leads on the few recordings held out and another on all of
-    them is chance: what is missing beside them may favour either. Members of the best's class, and
-    those that lead on both and are passed over for a simpler effect, are no such rivals.
-    """
-    assert best.fitted is not None
-    if explains(base, best, floor):
-        return ()
-    least = _energy(best.fitted)
-    return tuple(
-        row.label
-        for row in rows
-        if row is not best
-        and row.accepted
-        and row.fitted is not None
-        and row.free <= best.free
-        and row.held_out_error >= best.held_out_error
-        and row.label not in best.alike
-        and not same_family(best, row)
-        and _energy(row.fitted) < least
-    )
-
-
-def _energy(fitted: Fitted) -> float:
-    """Sum of the scaled squares of all residuals, of the training and of what is held out."""
-    return sum(
-        float(np.nansum(np.square(side.residuals / side.scale)))
-        for side in (fitted.train, fitted.held_out)
-    )
+    for row in rows:
+        if row.accepted and row.fitted is not None:
+            fall = 1 - row.fitted.train_error / max(base.train_error, 1e-300)
+            if fall < MATERIAL:
+                row.accepted = False
+                row.reason = (
+                    f"at the noise floor, and training error falls by less than {MATERIAL:.0%}"
+                )
 
 
 def _word(
@@ -263,12 +237,12 @@ def _simpler_of_all(best: Ranked, accepted: Sequence[Ranked]) -> Ranked:
     beside it there, as friction that falls with speed does where a supply sags.
     """
     assert best.fitted is not None
-    least = _energy(best.fitted)
+    least = energy_of_all(best.fitted)
     simpler = [
         row
         for row in accepted
         if row.free < best.free and same_family(best, row) and row.fitted is not None
-        if _energy(row.fitted) < least
+        if energy_of_all(row.fitted) < least
     ]
     return min(simpler, key=lambda row: (row.free, row.held_out_error), default=best)
 

@@ -6,7 +6,7 @@ are fitted (`refitting`) and judged by the held-out error (`acceptance`). `rank`
 """
 
 from rigwatch.workbench.ranking.acceptance import EXPLAINED, MATERIAL, STEP, judge_fit, left_over
-from rigwatch.workbench.ranking.candidates import candidates, shapes_of
+from rigwatch.workbench.ranking.candidates import candidates, shapes_of, suitable
 from rigwatch.workbench.ranking.fit_selection import select_for_fit
 from rigwatch.workbench.ranking.nested_start import refit_nested
 from rigwatch.workbench.ranking.paired_test import difference
@@ -56,5 +56,6 @@ __all__ = [
     "scored",
     "select_for_fit",
     "shapes_of",
+    "suitable",
     "with_refinements",
 ]

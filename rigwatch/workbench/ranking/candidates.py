@@ -30,6 +30,21 @@ def candidates(study: Study, recording: Recording) -> list[Candidate]:
     return every_candidate(ports, study.effects, effect_at, elective=study.file.whole_library)
 
 
+def suitable(study: Study) -> tuple[list[str], list[str]]:
+    """Effects that a port of the study's model suits: those that are ranked, and elective others.
+
+    Args:
+        study: its model and its effects.
+    """
+    names = [
+        name
+        for name, effect in study.effects.items()
+        if any(suits(effect, port, study.model) for port in study.model.ports.values())
+    ]
+    elective = [n for n in names if study.effects[n].elective and not study.file.whole_library]
+    return [name for name in names if name not in elective], elective
+
+
 def shapes_of(study: Study, recording: Recording, effect: str, port: str) -> list[Candidate]:
     """One effect at one port in each of its shapes, elective or not."""
     check_ports(study)

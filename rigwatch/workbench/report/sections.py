@@ -63,10 +63,11 @@ def headline(m: Material) -> str:
     best = m.explanation.ranking[0] if m.explanation.ranking else None
     name = f"{_plain(best.effect)} at {best.port}" if best else ""
     rivals = " or ".join(_plain(rival.split("@")[0]) for rival in m.explanation.rivals)
+    more = ", and more than that" if m.explanation.remains else ""
     undecided = f"{name} from {rivals}" if rivals else f"whether {name or 'anything'} is missing"
     words = {
         "nothing_missing": "nothing is missing",
-        "missing_effect": f"probably missing: {name}",
+        "missing_effect": f"probably missing: {name}{more}",
         "undetermined": f"this recording cannot tell {undecided}",
     }.get(m.explanation.verdict, VERDICTS[m.explanation.verdict])
     if m.explanation.also:

@@ -114,7 +114,7 @@ def explanation_lines(found: Explanation) -> list[str]:
     """What `rigwatch explain` prints."""
     base = found.comparison
     lines = [
-        f"verdict: {VERDICTS[found.verdict]}",
+        f"verdict: {headline(found)}",
         f"  {found.text}",
         f"  {doubt_of(found)}",
         *_named_lines(found),
@@ -134,6 +134,14 @@ def explanation_lines(found: Explanation) -> list[str]:
     if found.next_experiment:
         lines += ["", f"next experiment: {found.next_experiment.text}"]
     return lines + [f"note: {remark}" for remark in base.remarks]
+
+
+def headline(found: Explanation) -> str:
+    """The verdict in a few words, and how much more than the effect that it names is missing."""
+    title = VERDICTS[found.verdict]
+    if found.verdict != "missing_effect" or not found.remains:
+        return title
+    return f"{title}, and more than that: it leaves {found.remains:.0%} of the error's energy"
 
 
 def _named_lines(found: Explanation) -> list[str]:

@@ -8,11 +8,19 @@ import pytest
 from scipy.signal import welch
 
 from rigwatch.physics.engine.fit import Fit
+from rigwatch.physics.engine.fit.decimation import Thinning
 from rigwatch.physics.engine.fit.recording import Recording, joined
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.workbench.data.noise.noise_floor import NoiseFloor, find_period, quiet_scale
+from rigwatch.workbench.data.noise.noise_floor import (
+    NoiseFloor,
+    find_period,
+    from_residual,
+    quiet_scale,
+    repeats_at_once,
+)
 from rigwatch.workbench.data.noise.quietest_band import quietest_band
 from rigwatch.workbench.data.repeats import repeat_of
+from rigwatch.workbench.study import Study
 
 NOISE, RATE = 1e-3, 200.0
 
@@ -79,3 +87,55 @@ def reached(residual: FloatArray) -> bool:
     rms, chance = quietest_band([residual], RATE)
     floor = NoiseFloor(np.array([rms]), "quiet band", chance)
     return floor.reached(cast("Fit", SimpleNamespace(rms=np.array([residual.std()]))))
+
+
+def cycled(period: float, sensor: float = 1e-3) -> tuple[Fit, Recording]:
+    """A triangle, and a residual with a spike after each reversal that is thinned to one in nine.
+
+    Args:
+        period: of the triangle [samples].
+        sensor: noise of the measured triangle.
+    """
+    n = np.arange(4000)
+    draws = np.random.default_rng(5).normal(size=(2, len(n)))
+    phase = n / period % 0.5 * period
+    spikes = np.where(n / period % 1 < 0.5, 1.0, -1.0) * np.exp(-phase / 8) * (phase / 8)
+    drive = 2 / np.pi * np.arcsin(np.sin(2 * np.pi * n / period)) + sensor * draws[0]
+    thinning = Thinning(9, 2, (len(n),))
+    left = thinning.apply((spikes + 0.1 * draws[1])[None, :, None])
+    fitted = SimpleNamespace(residuals=left, rms=np.sqrt(np.mean(left**2, axis=(0, 1))))
+    return cast("Fit", fitted), Recording(1 / RATE, drive[:, None], drive[:, None], thinning)
+
+
+@pytest.mark.parametrize("period", [464.76, 187.31, 618.4])
+def test_what_a_wrong_model_leaves_at_each_reversal_is_not_noise(period: float) -> None:
+    fitted, recording = cycled(period)
+    noise, quiet = (
+        cycled(1e9)[0].residuals.std(),
+        quietest_band([fitted.residuals[0, :, 0]], RATE / 9, 0.38),
+    )
+    floor = from_residual(fitted, recording, 0.0, len(recording), at_once=True)
+    assert floor.rms == pytest.approx([noise], rel=0.2)
+    assert floor.lower_limit
+    assert not floor.reached(fitted)
+    assert quiet[0] > 1.25 * noise
+
+
+def test_a_triangle_that_repeats_only_nearly_tells_nothing_of_the_noise() -> None:
+    fitted, recording = cycled(464.76, sensor=0.05)
+    assert (
+        from_residual(fitted, recording, 0.0, len(recording), at_once=True).method == "quiet band"
+    )
+
+
+@pytest.mark.parametrize(
+    ("states", "effects", "counts"), [(0, 1, True), (0, 0, False), (1, 1, False)]
+)
+def test_repeats_count_from_the_second_step_on_for_outputs_that_follow_at_once(
+    states: int, effects: int, *, counts: bool
+) -> None:
+    study = SimpleNamespace(
+        model=SimpleNamespace(states={"x": None} if states else {}),
+        file=SimpleNamespace(effects=[None] * effects),
+    )
+    assert repeats_at_once(cast("Study", study)) == counts

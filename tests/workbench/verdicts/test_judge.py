@@ -12,6 +12,7 @@ from rigwatch.physics.engine.fit import Fit
 from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.explain.indistinguishable import undistinguished
+from rigwatch.workbench.explain.remaining_error import remaining_share
 from rigwatch.workbench.explain.sets.several_effects import with_similar
 from rigwatch.workbench.explain.verdict import Verdict, judge, not_converged
 from rigwatch.workbench.explain.verdict_calibration import CLEAR, probability_wrong
@@ -95,6 +96,23 @@ def test_nothing_is_missing_where_the_error_is_noise() -> None:
     assert found == Verdict("nothing_missing", None, (), (), text)
 
 
+@pytest.mark.parametrize(
+    ("error", "training", "word"),
+    [
+        pytest.param(1.15, 1.12, "nothing_missing", id="hardly trains"),
+        pytest.param(1.15, 1.08, "missing_effect", id="trains"),
+    ],
+)
+def test_at_the_noise_floor_the_training_error_must_fall_too(
+    error: float, training: float, word: str
+) -> None:
+    named = best(error=error - 0.05)
+    assert named.fitted is not None
+    named.fitted = replace(named.fitted, train=base(training).train)
+    assert judge(base(error), [named], QUIET).word == word
+    assert named.accepted == (word == "missing_effect")
+
+
 def test_what_no_effect_lowers_is_unknown() -> None:
     found = judge(base(2.0), [], PERIODS)
     text = "the held-out error is 2.00 times the noise floor, and no known effect lowers it"
@@ -170,6 +188,8 @@ def test_an_effect_that_leaves_most_is_not_the_answer() -> None:
         "; 38% of the error's energy remains, 2 times the noise floor"
     )
     assert judge(base(3.0), [best(error=2.0)], QUIET).word == "missing_effect"
+    assert remaining_share(base(3.0), best(error=2.0), QUIET) == pytest.approx(0.375)
+    assert remaining_share(base(3.0), best(error=1.0), QUIET) == 0.0
     assert judge(base(3.0), [best(error=2.7)], QUIET).word == "unknown_effect"
 
 
@@ -200,6 +220,32 @@ def test_an_effect_that_leads_on_the_recordings_held_out_alone_is_not_named(
     assert ("b@x explains more of all recordings together" in found.text) == (
         word == "undetermined"
     )
+
+
+@pytest.mark.parametrize(
+    ("held_out", "training", "other", "word"),
+    [
+        pytest.param(2.4, 2.4, {"uneven": 5.0}, "undetermined", id="held out cannot tell"),
+        pytest.param(2.4, 2.4, {"uneven": 0.0}, "missing_effect", id="held out can"),
+        pytest.param(2.4, 2.55, {"uneven": 5.0}, "missing_effect", id="hardly more of training"),
+        pytest.param(2.4, 2.4, {"uneven": 5.0, "free": 2}, "missing_effect", id="less simple"),
+        pytest.param(1.6, 2.4, {"uneven": 2.5}, "missing_effect", id="little is left"),
+        pytest.param(1.6, 2.5, {"uneven": 0.0, "accepted": True}, "undetermined", id="accepted"),
+        pytest.param(1.2, 2.5, {"uneven": 0.0, "accepted": True}, "missing_effect", id="at noise"),
+    ],
+)
+def test_an_effect_that_leaves_much_gives_way_to_one_that_the_training_favours(
+    held_out: float, training: float, other: dict[str, Any], word: str
+) -> None:
+    only = trained(best(error=held_out, cosines={"b@x": 0.3}), 2.6)
+    rival = row("b@x", accepted=other.get("accepted", False), free=other.get("free", 1))
+    error = (held_out + 0.4 * rival.accepted + 0.2) ** 2 + other["uneven"] * np.repeat(
+        [1.0, -1.0, 1.0, -1.0], 10
+    )
+    rival.fitted = replace(leaving(error), train=base(training).train)
+    found = judge(replace(base(), train=base(2.9).train), [only, rival], QUIET)
+    assert found.word == word
+    assert ("b@x" in found.rivals) == (word == "undetermined")
 
 
 @pytest.mark.parametrize(

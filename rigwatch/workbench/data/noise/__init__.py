@@ -8,6 +8,7 @@ from rigwatch.workbench.data.noise.noise_floor import (
     from_residual,
     lowered,
     quiet_scale,
+    repeats_at_once,
 )
 
 __all__ = [
@@ -18,4 +19,5 @@ __all__ = [
     "from_residual",
     "lowered",
     "quiet_scale",
+    "repeats_at_once",
 ]

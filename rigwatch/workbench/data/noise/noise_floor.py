@@ -2,7 +2,8 @@
 
 Repeated periods of the excitation are best: their differences are noise. Next best is a healthy
 recording, which also includes model error. Otherwise the quietest band of the residual, assumed to
-be white noise, gives a lower limit.
+be white noise, gives a lower limit, or what does not repeat with an excitation of any period where
+that is less: missing physics may fill all bands.
 """
 
 import math
@@ -15,14 +16,23 @@ from rigwatch.physics.transfer import period_by_correlation, shortest_period
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.workbench.data.noise.error_spectrum import ErrorSpectrum
 from rigwatch.workbench.data.noise.quietest_band import quietest_band
+from rigwatch.workbench.data.noise.unrepeated import unrepeated
+from rigwatch.workbench.study import Study
 
 METHODS = {
     "periods": "differences between repeated periods of the excitation",
     "healthy": "the error of the model on a healthy recording",
     "healthy motion": "the error of the model along the motion of a healthy recording",
+    "repeats": "what of the residual does not repeat with the excitation: a lower limit",
     "quiet band": "the quietest band of the residual, assumed to be white noise: a lower limit",
 }
-ALLOWED = {"periods": 1.1, "healthy": 1.1, "healthy motion": 1.05, "quiet band": 1.25}
+ALLOWED = {
+    "periods": 1.1,
+    "healthy": 1.1,
+    "healthy motion": 1.05,
+    "repeats": 1.25,
+    "quiet band": 1.25,
+}
 """Largest ratio of error to noise floor at which nothing remains to be explained, by method."""
 BY_CHANCE = 0.1
 """Energy above the model's own error, in units of the noise floor, that chance leaves."""
@@ -47,6 +57,11 @@ class NoiseFloor:
     method: str
     chance: float = 1.0
     own_error: ErrorSpectrum | None = None
+
+    @property
+    def lower_limit(self) -> bool:
+        """Whether it is only the least that the noise can be."""
+        return self.method in {"quiet band", "repeats"}
 
     @property
     def allowed(self) -> float:
@@ -100,14 +115,18 @@ class NoiseFloor:
         return max(left - BY_CHANCE, 0.0) / max(above, 1e-12)
 
 
-def from_residual(fitted: Fit, recording: Recording, period: float, horizon: int) -> NoiseFloor:
-    """The floor from repeated periods if there are enough, otherwise from the quietest band.
+def from_residual(
+    fitted: Fit, recording: Recording, period: float, horizon: int, *, at_once: bool = False
+) -> NoiseFloor:
+    """The floor from repeated periods if there are enough, otherwise a lower limit.
 
     Args:
         fitted: the fit with its residuals.
         recording: the recording it was fitted to.
         period: of the excitation [s]; 0 to search for one in the inputs.
         horizon: samples between re-initialisations; a period must hold a whole number of them.
+        at_once: whether the outputs follow from the inputs at once, so that what a wrong model
+            leaves repeats with them.
     """
     factor = recording.thinning.factor if recording.thinning else 1
     samples = round(period / recording.dt) if period else find_period(recording)
@@ -119,11 +138,33 @@ def from_residual(fitted: Fit, recording: Recording, period: float, horizon: int
     rate = 1 / (recording.dt * factor)
     top = 0.38 if factor > 1 else recording.passed
     quiet, chances = zip(*(quietest_band([c], rate, top) for c in series.T), strict=True)
+    own = unrepeated(fitted, recording) if at_once else None
+    if own is not None and np.all(own[0] < quiet):
+        return NoiseFloor(own[0], "repeats", own[1])
     return NoiseFloor(np.array(quiet), "quiet band", max(chances))
 
 
+def repeats_at_once(study: Study) -> bool:
+    """Whether what repeats with the excitation counts as left by a wrong model.
+
+    The outputs must follow from the inputs at once. Before an effect is accepted it does not count:
+    laws that share what is missing, such as two kinds of hysteresis, would stay rivals for what is
+    little beside it.
+
+    Args:
+        study: its model and accepted effects.
+    """
+    return not study.model.states and bool(study.file.effects)
+
+
 def lowered(
-    floor: NoiseFloor, fitted: Fit, recording: Recording, period: float, horizon: int
+    floor: NoiseFloor,
+    fitted: Fit,
+    recording: Recording,
+    period: float,
+    horizon: int,
+    *,
+    at_once: bool = False,
 ) -> NoiseFloor:
     """The floor, or that of another fit's quietest band in the channels where it is lower.
 
@@ -132,11 +173,11 @@ def lowered(
 
     Args:
         floor: of another fit to the same recording.
-        fitted, recording, period, horizon: as in `from_residual`.
+        fitted, recording, period, horizon, at_once: as in `from_residual`.
     """
     if floor.method != "quiet band":
         return floor
-    own = from_residual(fitted, recording, period, horizon)
+    own = from_residual(fitted, recording, period, horizon, at_once=at_once)
     return replace(floor, rms=np.minimum(floor.rms, own.rms))
 
 

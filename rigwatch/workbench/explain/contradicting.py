@@ -1,0 +1,118 @@
+"""Effects that other recordings speak for than those held out, where much remains unexplained.
+
+Where several effects are missing, the few recordings held out may favour another than the training.
+What leads there is then not named with confidence.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigwatch.workbench.data import NoiseFloor
+from rigwatch.workbench.explain.indistinguishable import same_family
+from rigwatch.workbench.explain.remaining_error import LITTLE, explains
+from rigwatch.workbench.fit import Fitted
+from rigwatch.workbench.ranking import MATERIAL, Ranked, difference
+
+CONTRADICTED = 2.0
+"""Ratio of the training energy explained by another effect above which the best is in doubt."""
+FAVOURED = 1.25
+"""The same where what is held out cannot tell the two apart, and the best leaves much of both."""
+HALF = 0.5
+"""Share of the training's energy above which one that explains more of it is a rival."""
+REFUTED = 5e-3
+"""p-value of a rise of the held-out error below which it tells an effect from the best; eight
+blocks of one sign, the fewest of the test, reach it."""
+
+
+def explaining_training(base: Fitted, best: Ranked, rows: Sequence[Ranked]) -> tuple[str, ...]:
+    """Labels of effects that lower both errors and explain far more of the training than the best.
+
+    Training and held-out recordings then disagree on what is missing, as where several effects are
+    and one of them happens to matter in the recordings held out.
+    """
+    assert best.fitted is not None
+    least = CONTRADICTED * max(base.train_error**2 - best.fitted.train_error**2, 0.0)
+    return tuple(
+        row.label
+        for row in rows
+        if row is not best
+        and row.fitted is not None
+        and row.held_out_error < base.held_out_error
+        and base.train_error**2 - row.fitted.train_error**2 > least
+    )
+
+
+def explaining_all(
+    base: Fitted, best: Ranked, rows: Sequence[Ranked], floor: NoiseFloor
+) -> tuple[str, ...]:
+    """Labels of accepted effects, no less simple, that leave less of all recordings than the best.
+
+    While much remains, that one effect leads on the few recordings held out and another on all of
+    them is chance: what is missing beside them may favour either. Members of the best's class, and
+    those that lead on both and are passed over for a simpler effect, are no such rivals.
+    """
+    assert best.fitted is not None
+    if explains(base, best, floor):
+        return ()
+    least = energy_of_all(best.fitted)
+    return tuple(
+        row.label
+        for row in rows
+        if row is not best
+        and row.accepted
+        and row.fitted is not None
+        and row.free <= best.free
+        and row.held_out_error >= best.held_out_error
+        and row.label not in best.alike
+        and not same_family(best, row)
+        and energy_of_all(row.fitted) < least
+    )
+
+
+def favoured_by_training(
+    base: Fitted, best: Ranked, rows: Sequence[Ranked], floor: NoiseFloor
+) -> tuple[str, ...]:
+    """Labels of effects, no less simple, that explain more of the training than the best.
+
+    Asked where the best leaves much: what moves the held-out recordings is then also something
+    else, which may favour a wrong effect there. Where it leaves half of the training, these are
+    accepted effects. Where it leaves a third of both errors they need not be, as the rest may raise
+    the error of the right effect, but must explain clearly more, and what is held out must not
+    speak for the best far beyond chance: many effects are compared.
+    """
+    assert best.fitted is not None
+    after = best.fitted
+    if floor.reached(after.held_out):
+        return ()
+    held_out, train = (
+        floor.left_over(*side)
+        for side in ((base.held_out, after.held_out), (base.train, after.train))
+    )
+    gain = max(base.train_error**2 - after.train_error**2, 0.0)
+
+    def favoured(row: Ranked) -> bool:
+        fitted = row.fitted
+        if fitted is None or fitted.train_error > (1 - MATERIAL) * base.train_error:
+            return False
+        more = base.train_error**2 - fitted.train_error**2
+        if row.accepted and train > HALF and more > gain:
+            return True
+        much = min(held_out, train) >= LITTLE and more > FAVOURED * gain
+        return much and difference(after.held_out, fitted.held_out).p_rises >= REFUTED
+
+    return tuple(row.label for row in rows if _is_another(best, row) and favoured(row))
+
+
+def _is_another(best: Ranked, row: Ranked) -> bool:
+    """Whether it is an effect of other physics, no less simple than the best."""
+    alike = row is best or row.label in best.alike or same_family(best, row)
+    return not alike and row.free <= best.free
+
+
+def energy_of_all(fitted: Fitted) -> float:
+    """Sum of the scaled squares of all residuals, of the training and of what is held out."""
+    return sum(
+        float(np.nansum(np.square(side.residuals / side.scale)))
+        for side in (fitted.train, fitted.held_out)
+    )
