@@ -33,9 +33,19 @@ from rigwatch.wire.arrays import FloatArray
 
 HISTORY = 512
 """Number of samples stored for isolation."""
-Y, SIGN_PART, SPEED_PART, SPEED, AT_REST, VOLTS = range(6)
-"""Columns of the history: change of residual, g1, g2, velocity, 1 at rest, change of voltage."""
+Y, SIGN_PART, SPEED_PART, SPEED, AT_REST, VOLTS, PLACE = range(7)
+"""Columns of the history: change of residual, g1, g2, velocity, 1 at rest, change of voltage,
+position.
+"""
 _RIVALS = 11
+SEEN_OVER = 4
+"""Samples over which rest is seen: noise in one of them ends it for so many."""
+LEAST_MOTION = SEEN_OVER + 1
+"""Samples of motion between two stops."""
+DRIFT, DRIFT_TIME = 6.0, 32
+"""Distance in standard deviations of the position that a mass which sticks does not move within so
+many samples. One that is loose, as with play between rod and mass, coasts slowly.
+"""
 
 
 class History(NamedTuple):
@@ -45,6 +55,20 @@ class History(NamedTuple):
     head: NDArray[np.int64]
     b: FloatArray
     a: FloatArray
+
+
+class Rest(NamedTuple):
+    """Rest of the mass in one place.
+
+    Args:
+        share: of the samples.
+        always: the smaller of the shares in the two halves of the samples.
+        stops: number of separate stretches.
+    """
+
+    share: float
+    always: float
+    stops: int
 
 
 class Evidence(NamedTuple):
@@ -57,6 +81,7 @@ class Evidence(NamedTuple):
         rho: correlation of the jump with the residual of the rivals.
         rest: share of the samples at rest.
         rest_always: the smaller of the shares at rest in the two halves of the samples.
+        stops: number of separate stretches at rest.
         rivals: share of y² that the rivals explain.
         jump: energy explained by the jump beyond the rivals [(m/s^2)^2].
         together: share of y² that rivals and jump explain together.
@@ -69,6 +94,7 @@ class Evidence(NamedTuple):
     rho: float
     rest: float
     rest_always: float
+    stops: int
     rivals: float
     jump: float
     together: float
@@ -78,17 +104,24 @@ class Evidence(NamedTuple):
 
 def new_history(b: FloatArray, a: FloatArray) -> History:
     """An empty history for the friction filter b/a, padded to equal length."""
-    return History(np.zeros((HISTORY, 6)), np.zeros(1, np.int64), b, a)
+    return History(np.zeros((HISTORY, 7)), np.zeros(1, np.int64), b, a)
 
 
 @njit(inline="always")
 def store_sample(  # noqa: PLR0917
-    history: History, y: float, g1: float, g2: float, speed: float, rest: float, volts: float
+    history: History,
+    y: float,
+    g1: float,
+    g2: float,
+    speed: float,
+    rest: float,
+    volts: float,
+    place: float,
 ) -> None:
     """Store one sample."""
     row = history.rows[history.head[0]]
     row[Y], row[SIGN_PART], row[SPEED_PART], row[SPEED] = y, g1, g2, speed
-    row[AT_REST], row[VOLTS] = rest, volts
+    row[AT_REST], row[VOLTS], row[PLACE] = rest, volts, place
     head = history.head[0] + 1
     history.head[0] = head if head < HISTORY else 0
 
@@ -108,19 +141,52 @@ def evidence_of(history: History, ref: Reference, seq: int, since: int, count: i
     data = np.zeros((n, _RIVALS + 3))
     _fill_rivals(data, ref, seq, n)
     _fill_friction(data, history, since, n)
-    first = second = peak = 0.0
+    peak = 0.0
     for k in range(n):
         at = (history.head[0] - n + k) % HISTORY
         data[k, _RIVALS + 2] = history.rows[at, Y]
-        at_rest = history.rows[at, AT_REST]
-        # Rest in both halves separates repeated sticking from a single stop.
-        if 2 * k < n:
-            first += at_rest
-        else:
-            second += at_rest
         peak = max(peak, history.rows[at, Y] ** 2)
-    gram = data.T @ data
-    return _compare(gram, (first + second) / n, 2.0 * min(first, second) / n, peak)
+    return _compare(data.T @ data, rest_of(history, n, ref.levels.position_noise), peak)
+
+
+@njit()
+def rest_of(history: History, n: int, noise: float) -> Rest:
+    """Rest in one place over the newest `n` samples; stretches in which the mass drifts are none.
+
+    Args:
+        history: the newest samples.
+        n: number of samples.
+        noise: standard deviation of the position [m].
+    """
+    rows, first = history.rows, history.head[0] - n
+    stops, halves = 0, np.zeros(2)
+    # The stretch at rest: its first sample, its extent, and its samples in both halves.
+    begin, low, high, drifts, inside = 0, 0.0, 0.0, True, np.zeros(2)
+    moving = LEAST_MOTION
+    for k in range(n):
+        moving += 1
+        if rows[(first + k) % HISTORY, AT_REST] == 0.0:
+            continue
+        place = rows[(first + k) % HISTORY, PLACE]
+        low, high = min(low, place), max(high, place)
+        far = high - low > DRIFT * noise
+        if moving > LEAST_MOTION or (far and k - begin > DRIFT_TIME):
+            if not drifts:
+                halves += inside
+                stops += 1
+            begin, low, high, drifts = k, place, place, False
+            inside[:] = 0.0
+            for before in range(max(k - SEEN_OVER + 1, 0), k):
+                place = rows[(first + before) % HISTORY, PLACE]
+                low, high = min(low, place), max(high, place)
+        elif far:
+            drifts = True
+        inside[1 if 2 * k >= n else 0] += 1.0
+        moving = 0
+    if not drifts:
+        halves += inside
+        stops += 1
+    return Rest((halves[0] + halves[1]) / n, 2.0 * min(halves[0], halves[1]) / n, stops)
 
 
 @njit()
@@ -180,7 +246,7 @@ def _fill_friction(data: FloatArray, history: History, since: int, n: int) -> No
 
 
 @njit()
-def _compare(gram: FloatArray, rest: float, rest_always: float, peak: float) -> Evidence:
+def _compare(gram: FloatArray, rest: Rest, peak: float) -> Evidence:
     """Evidence from the normal matrix of rivals, friction regressors and y, in this order."""
     yy = max(gram[-1, -1], 1e-30)
     explained, dry = _friction_fit(gram, yy)
@@ -190,8 +256,9 @@ def _compare(gram: FloatArray, rest: float, rest_always: float, peak: float) -> 
         explained,
         sign * jump / yy,
         rho,
-        rest,
-        rest_always,
+        rest.share,
+        rest.always,
+        rest.stops,
         1.0 - remains / yy,
         jump,
         1.0 - (remains - jump) / yy,

@@ -49,11 +49,18 @@ FOLLOW_FIT, FOLLOW_DRY, FOLLOW_SHARE, FOLLOW_RHO = 0.93, 0.3, 0.001, 0.2
 THIN_SHARE, THIN_RHO = 0.3, 0.6
 """The jump alone is one third of the change."""
 STILL, STILL_TOGETHER, STILL_RHO = 0.04, 0.7, -0.5
-"""Stick-slip: at rest for longer than a smooth motion is at its turning points, in more than one
-cycle, in a change that is not chaotic, and without a jump that clearly supplies energy, as that of
-a fading drive does. Unless the mass is stuck permanently, friction also dissipates energy while it
-slips: its Coulomb part is positive, unlike that of a rig damped to rest.
+"""Stick-slip: at rest for longer than a smooth motion is at its turning points, again and again, in
+a change that is not chaotic, and without a jump that clearly supplies energy, as that of a fading
+drive does. Unless the mass is stuck permanently, friction also dissipates energy while it slips:
+its Coulomb part is positive, unlike that of a rig damped to rest.
 """
+LONG_STILL = 0.15
+"""Share of the time at rest below which the mass slides most of the time. Friction is then seen in
+its sliding, too; otherwise the motion is merely slow at its turning points, as where it fades for a
+while or a square wave moves the mass from stop to stop.
+"""
+AGAIN = 2
+"""Number of stops that is more than chance: after a sudden change the mass may rest once."""
 STUCK = 0.5
 """Share of the time at rest above which it is stiction rather than friction."""
 SPIKE = 0.5
@@ -111,7 +118,7 @@ def _friction(seen: Seen, evidence: Evidence) -> bool:
         return False
     if not (seen.moved_position or evidence.share > SURE_SHARE):
         return False
-    if _certain(seen, evidence) or _slips(seen, evidence):
+    if _certain(seen, evidence) or slips(seen, evidence):
         return True
     if 2 * seen.since >= seen.cycle and (_plain(evidence) or _follows(evidence)):
         return True
@@ -161,14 +168,23 @@ def _thin(evidence: Evidence) -> bool:
 
 
 @njit()
-def _slips(seen: Seen, evidence: Evidence) -> bool:
+def slips(seen: Seen, evidence: Evidence) -> bool:
     """Pattern: the mass is at rest while the healthy one moves."""
     if seen.since < seen.cycle or seen.before == OTHER:
         return False
+    stuck = evidence.rest >= STUCK
+    again = evidence.rest_always > 0.0 and (evidence.stops >= AGAIN or stuck)
     orderly = evidence.together > STILL_TOGETHER and evidence.rho > STILL_RHO
-    again = evidence.rest > STILL and evidence.rest_always > 0.0
-    rubs = evidence.dry > 0.0 or evidence.rest >= STUCK
-    return again and orderly and rubs
+    rubs = evidence.dry > 0.0 or stuck
+    long = evidence.rest > LONG_STILL or (evidence.rest > STILL and _slides(evidence))
+    return long and again and orderly and rubs
+
+
+@njit()
+def _slides(evidence: Evidence) -> bool:
+    """Whether friction shows in the sliding between stops: as a jump, or as most of the change."""
+    jumps = evidence.share > LEAST_SHARE and evidence.rho > JUMP_RHO
+    return jumps or (evidence.explained > JUMP_FIT and evidence.dry > LEAST_DRY)
 
 
 @njit()

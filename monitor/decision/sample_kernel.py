@@ -123,7 +123,7 @@ def _skip(state: WatchState) -> None:
     """Process a sample that does not count, so that windows keep their length in time."""
     push(state.window, np.zeros(3))
     add(state.energies, np.zeros(5))
-    store_sample(state.history, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    store_sample(state.history, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if state.counts.episode > 0:
         state.counts.episode += 1
 
@@ -172,7 +172,9 @@ def _take(
     push(state.window, row)
     rest = _at_rest(data, ref, state)
     _count_still(data[POSITION], rest, ref, state)
-    store_sample(state.history, y, data[G1], data[G2], data[VELOCITY], rest, signals[V])
+    store_sample(
+        state.history, y, data[G1], data[G2], data[VELOCITY], rest, signals[V], data[POSITION]
+    )
     state.held[CHANGE] = y
 
 

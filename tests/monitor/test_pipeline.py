@@ -8,7 +8,7 @@ from monitor.signals import conditions as kinds
 from rigwatch.wire.messages.message_types import Column, SampleBlock
 from rigwatch.wire.messages.quality_flags import NON_FINITE
 from sim_plant.effects import EFFECTS
-from sim_plant.excitation import Shape, Square
+from sim_plant.excitation import Shape, Sine, Square
 from tests.monitor.monitor_rig import (
     OTHER_SINE,
     RATE,
@@ -89,6 +89,16 @@ def test_very_high_stiction_is_named_beside_friction() -> None:
 def test_other_faults_are_alarmed_and_not_called_friction(name: str) -> None:
     result = watched(run(SINE, 8.0, fault(name, EFFECTS[name].typical), seed=25))
     assert active(result, kinds.DEPARTURE)[ONSET:].any()
+    assert active(result, kinds.OTHER_FAULT)[ONSET:].any()
+    assert not active(result, kinds.DRY_FRICTION).any()
+    assert not active(result, kinds.STICTION).any()
+
+
+@pytest.mark.parametrize("gap", [1.5e-3, 1.7e-3, 1.9e-3, 2.1e-3])
+def test_a_mass_that_is_loose_and_coasts_does_not_stick(gap: float) -> None:
+    """With play as wide as half of the rod's motion the mass is at rest at times, but drifts."""
+    drive = Sine(amplitude=1.0, frequency=10.0)
+    result = watched(run(drive, 8.0, fault("backlash", gap), seed=31))
     assert active(result, kinds.OTHER_FAULT)[ONSET:].any()
     assert not active(result, kinds.DRY_FRICTION).any()
     assert not active(result, kinds.STICTION).any()
