@@ -16,6 +16,7 @@ from rigwatch.workbench.explain.adequacy import (
     with_base_offered,
     with_change_told,
 )
+from rigwatch.workbench.explain.changed_parameters import undetermined_if_parameters_changed
 from rigwatch.workbench.explain.credibility import credible_verdict
 from rigwatch.workbench.explain.exchange import Exchange, exchange
 from rigwatch.workbench.explain.excitation import cannot_tell, unexcited
@@ -168,6 +169,7 @@ def _judged(bench: Bench, rows: list[Ranked], progress: Progress) -> tuple[list[
     elif along:
         verdict = undetermined_if_much_left(bench.base, bench.floor, verdict)
         verdict = undetermined_if_little_and_unexplained(bench.base, bench.floor, verdict)
+        verdict = undetermined_if_parameters_changed(bench, verdict, progress)
     verdict = cannot_tell(bench, rows, verdict)
     verdict = stopped_by_outliers(bench, verdict)
     verdict = with_base_offered(bench, unchecked(bench, verdict))

@@ -52,13 +52,23 @@ def shapes_of(study: Study, recording: Recording, effect: str, port: str) -> lis
     return shaped(effect, study.effect_at(effect, port).scaled(sizes), port)
 
 
-def refining(study: Study, recording: Recording, effect: str, port: str) -> list[Candidate]:
-    """The elective effects that refine one effect at its port, in each of their shapes."""
+def refining(
+    study: Study, recording: Recording, effect: str, port: str, *, likened: bool = False
+) -> list[Candidate]:
+    """The elective effects that refine one effect at its port, in each of their shapes.
+
+    Args:
+        study, recording: as for `candidates`.
+        effect, port: what is refined.
+        likened: include those that the library calls similar to it: of what explains a part of an
+            effect that is not ranked, the best need not be the one that it refines.
+    """
     placed = {(a.effect, a.port) for a in study.file.effects}
     names = [
         name
         for name, other in study.effects.items()
-        if other.elective and other.refines == effect and (name, port) not in placed
+        if other.elective and (name, port) not in placed
+        if other.refines == effect or (likened and effect in other.confused_with)
         if suits(other, study.model.ports[port], study.model)
     ]
     return [c for name in names for c in shapes_of(study, recording, name, port)]

@@ -37,7 +37,7 @@ def with_refinements(  # noqa: PLR0917 -- they belong together
         best: its best effect.
         progress: called with a line of text as each fit begins.
     """
-    known = refinements(study, data, base, rows, (best,))
+    known = refinements(study, data, base, rows, (best,), likened=True)
     added = sorted(known, key=lambda row: -row.explained)[:MOST]
     for row in added:
         progress(f"fitting {row.label}, which refines {best.label}")
@@ -46,7 +46,13 @@ def with_refinements(  # noqa: PLR0917 -- they belong together
 
 
 def refinements(
-    study: Study, data: Data, base: Fitted, rows: Sequence[Ranked], refined: Sequence[Ranked]
+    study: Study,
+    data: Data,
+    base: Fitted,
+    rows: Sequence[Ranked],
+    refined: Sequence[Ranked],
+    *,
+    likened: bool = False,
 ) -> list[Ranked]:
     """Refinements of some effects that are not ranked yet, scored together with all others.
 
@@ -54,8 +60,13 @@ def refinements(
         study, data, base: the study, its recordings and the fitted model.
         rows: the ranking; the rows get their cosines with the refinements.
         refined: the effects.
+        likened: include elective effects that are similar to them, see `refining`.
     """
-    more = [c for row in refined for c in refining(study, data.train, row.effect, row.port)]
+    more = [
+        candidate
+        for row in refined
+        for candidate in refining(study, data.train, row.effect, row.port, likened=likened)
+    ]
     new = {candidate.label for candidate in more} - {row.label for row in rows}
     if not new:
         return []

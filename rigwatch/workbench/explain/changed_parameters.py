@@ -1,0 +1,77 @@
+"""Whether changed parameters of the model explain a residual better than the effect named.
+
+A healthy recording fixes the model's own parameters. A fault may change what they stand for: a
+clogged silencer, a supply that sags, a leaking line. No effect of the library describes that, but
+one that resembles it explains most of the residual, as a gain of a sensor does. The model without
+the effect, its kept parameters free again, then leaves less of the held-out recordings. A true
+effect that is in the library leaves nothing that these parameters could explain beside it.
+"""
+
+from dataclasses import replace
+
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.compare import Bench
+from rigwatch.workbench.explain.rough_verdict import SHARE
+from rigwatch.workbench.explain.verdict import Verdict
+from rigwatch.workbench.fit import Fitted, fit_model, with_kept_free
+from rigwatch.workbench.ranking import Progress, Ranked, difference
+from rigwatch.workbench.study import told
+
+CHANCE = 0.1
+"""One-sided level at which changed parameters are better: it is higher than that of accepting an
+effect, as a doubt needs less evidence than a name.
+"""
+
+
+def undetermined_if_parameters_changed(bench: Bench, found: Verdict, progress: Progress) -> Verdict:
+    """The verdict, undetermined if the model's own parameters explain more than the effect named.
+
+    Args:
+        bench: a study along the measured motion.
+        found: the verdict on effects.
+        progress: called with a line of text as the fit begins.
+    """
+    best = found.best
+    if found.word != "missing_effect" or found.second or bench.study.kept is None or best is None:
+        return found
+    # What may be left for the parameters to explain beside the effect.
+    if (
+        best.fitted is None
+        or bench.floor.left_over(bench.base.held_out, best.fitted.held_out) <= SHARE
+    ):
+        return found
+    progress(f"comparing {best.label} with changed parameters of the model")
+    changed = _refitted(bench)
+    if changed is None or not _explains_more(bench, best, changed):
+        return found
+    unit = bench.base.told_in
+    text = (
+        f"{best.label} lowers the held-out error to {told(best.held_out_error, unit):.3g}, changed"
+        f" parameters of the model itself to {changed.told_error:.3g} {unit}: something that they"
+        " stand for may have changed since the healthy recording, such as pressures, lines or"
+        " friction of the healthy rig"
+    )
+    return replace(found, word="undetermined", text=text)
+
+
+def _refitted(bench: Bench) -> Fitted | None:
+    """The model without the effect, its kept parameters free; None if it cannot be fitted."""
+    loose = replace(bench.study, model=with_kept_free(bench.study.model))
+    start, scale = bench.base.train.values(), bench.base.train.scale
+    try:
+        return fit_model(loose, bench.data, bench.base.placements, start, scale)
+    except ModelError:
+        return None
+
+
+def _explains_more(bench: Bench, best: Ranked, changed: Fitted) -> bool:
+    """Whether it explains a share of the error that an effect named alone may not leave."""
+    assert best.fitted is not None
+    falls = difference(best.fitted.held_out, changed.held_out).p_falls
+    more = _left(bench, best.fitted) - _left(bench, changed)
+    return bench.floor.reached(changed.held_out) and more > SHARE and falls < CHANCE
+
+
+def _left(bench: Bench, fitted: Fitted) -> float:
+    """Share of the error's energy above the floor that a fit leaves."""
+    return bench.floor.left_over(bench.base.held_out, fitted.held_out)
