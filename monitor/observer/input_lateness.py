@@ -98,7 +98,7 @@ def follow_lateness(  # noqa: PLR0917 -- a kernel
         usually = (1.0 - EXPLAINS) * energy + USUAL * largest
         least = max(least, min(usually, (1.0 - MOST_OF_IT) * energy))
     least = min(least, _rubbing(kept, first) / RATHER)
-    if energy > largest and _left(found, kept, first) < least:
+    if energy > largest and _left(found, kept, first) < least and abs(found) < MOST:
         kept[TAU] = found
     else:
         kept[TAU] = _towards_none(kept[TAU], found)
@@ -176,8 +176,12 @@ def rubs(kept: FloatArray) -> bool:
 
 @njit()
 def lateness_changes(kept: FloatArray) -> bool:
-    """Whether there is a lateness and the newest samples show another one than those before."""
-    return is_late(kept) and abs(_best(kept, OF_QUICK) - _best(kept, OF_SLOW)) > UNSTEADY
+    """Whether there is a lateness and the newest samples show another one than those before.
+
+    More than inputs can be late is none: something else has changed.
+    """
+    found, before = _best(kept, OF_QUICK), _best(kept, OF_SLOW)
+    return is_late(kept) and abs(found) < MOST and abs(found - before) > UNSTEADY
 
 
 @njit()

@@ -145,6 +145,18 @@ def test_a_lateness_that_is_gone_is_forgotten() -> None:
     assert learnt(np.zeros(N), kept=kept)[TAU] == 0.0
 
 
+def test_more_than_inputs_can_be_late_is_none() -> None:
+    assert learnt(2.0 * LATE)[TAU] == 0.0
+
+    kept = learnt(-0.5 * LATE)
+    row = np.zeros(len(COLUMNS))
+    for late in LATE[: round(SLOW / 4)]:
+        row[E], row[LATE_UNIT] = 3.0 * late, late
+        follow_lateness(row, NOISE**2, False, True, False, kept)
+
+    assert not lateness_changes(kept)
+
+
 def test_a_lateness_that_jumps_is_said_to_change() -> None:
     kept = learnt(-0.5 * LATE)
     row = np.zeros(len(COLUMNS))
