@@ -125,6 +125,8 @@ def main() -> int:
         and (not chosen.effect or "+".join(case.hidden) in chosen.effect)
     )
     found = collected(chosen.results, Outcome, tried, solve, said=_line, minutes=chosen.minutes)
+    if not found:
+        parser.error(f"no case is selected; seeds begin with {chosen.first}, see --first")
     print(as_text(chain_rows(found)))
     return 0
 
