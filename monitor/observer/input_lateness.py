@@ -33,6 +33,8 @@ USUAL, MOST_OF_IT = 0.6, 0.5
 """The same when the motion has just become known: what a healthy rig leaves on average, and the
 share that must be explained in any case. Later, so little would be a small fault.
 """
+SOME_OF_IT = 0.2
+"""Share that a lateness explains even while it jumps to another one."""
 RATHER = 2.0
 """Ratio of what dry friction leaves to what it leaves above which it is a lateness: where both
 explain the residual, friction is an alarm and a lateness hides one.
@@ -178,10 +180,14 @@ def rubs(kept: FloatArray) -> bool:
 def lateness_changes(kept: FloatArray) -> bool:
     """Whether there is a lateness and the newest samples show another one than those before.
 
-    More than inputs can be late is none: something else has changed.
+    One that explains hardly anything, or less than dry friction, or is more than inputs can be late
+    is none: something else has changed.
     """
     found, before = _best(kept, OF_QUICK), _best(kept, OF_SLOW)
-    return is_late(kept) and abs(found) < MOST and abs(found - before) > UNSTEADY
+    if not is_late(kept) or abs(found) >= MOST or abs(found - before) <= UNSTEADY:
+        return False
+    some = _left(found, kept, OF_QUICK) < (1.0 - SOME_OF_IT) * kept[OF_QUICK + ERRORS]
+    return some and not rubs(kept)
 
 
 @njit()

@@ -22,6 +22,10 @@ def sine(t: np.ndarray) -> np.ndarray:
     return 1.4 * np.sin(2.0 * np.pi * 8.0 * t)
 
 
+def triangle(t: np.ndarray) -> np.ndarray:
+    return 1.2 * 2.0 / np.pi * np.arcsin(np.sin(2.0 * np.pi * 8.0 * t))
+
+
 def slower(t: np.ndarray) -> np.ndarray:
     return np.sin(2.0 * np.pi * 6.0 * t)
 
@@ -61,6 +65,16 @@ def test_friction_is_noticed_and_nothing_before_it(updates_hz: float, between: b
     assert min(times[name] for name in FAULTS & times.keys()) >= 7.0
     assert times["departure"] < 7.2
     assert times["dry_friction"] < 7.5
+
+
+@pytest.mark.parametrize(("wave", "off"), [(triangle, 1e-3), (sine, -7e-4)])
+def test_friction_is_noticed_while_the_steps_slide(wave: Wave, off: float) -> None:
+    # It sets in while the generator's clock is not yet known, and while a lateness is remembered.
+    voltage = held(wave, RATE * (1.0 + off), 18.0, between=True, events=coulomb(10.0))
+    times = raised(watched(voltage))
+
+    assert min(times[name] for name in FAULTS & times.keys()) >= 10.0
+    assert "dry_friction" in times
 
 
 def test_commissioning_takes_held_readings_as_they_are() -> None:

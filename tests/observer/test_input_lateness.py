@@ -159,9 +159,20 @@ def test_more_than_inputs_can_be_late_is_none() -> None:
 
 def test_a_lateness_that_jumps_is_said_to_change() -> None:
     kept = learnt(-0.5 * LATE)
-    row = np.zeros(len(COLUMNS))
-    for late in LATE[: round(SLOW / 4)]:
-        row[E], row[LATE_UNIT] = 0.4 * late, late
+    row, changes = np.zeros(len(COLUMNS)), []
+    for late, dry in zip(LATE[: round(SLOW)], DRY, strict=False):
+        row[E], row[LATE_UNIT], row[DRY_UNIT] = 0.4 * late, late, dry
         follow_lateness(row, NOISE**2, False, True, False, kept)
+        changes.append(lateness_changes(kept))
 
-    assert lateness_changes(kept)
+    assert sum(changes) > SLOW / 2
+
+
+def test_friction_is_no_lateness_that_changes() -> None:
+    kept, row, changes = learnt(-0.5 * LATE), np.zeros(len(COLUMNS)), []
+    for late, dry in zip(LATE, DRY, strict=True):
+        row[E], row[LATE_UNIT], row[DRY_UNIT] = 0.5 * dry, late, dry
+        follow_lateness(row, NOISE**2, False, True, False, kept)
+        changes.append(lateness_changes(kept))
+
+    assert not any(changes[round(SLOW) :])
