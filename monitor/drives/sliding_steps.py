@@ -193,6 +193,11 @@ def _follow(way: int, kept: FloatArray) -> None:
         kept[INTERVAL] += (age / _parts(age, interval) - interval) * FORGET
         kept[SKIPS], kept[STRAY], kept[AGE] = min(kept[SKIPS] + 1.0, SURE), 0.0, 0.0
         return
+    if kept[SKIPS] >= 2.0 and way == kept[WAY] and age >= SHORTEST and _regular(interval, age):
+        # Skips at the corners of a drive are not seen: the interval was one of several.
+        kept[INTERVAL] = interval / _parts(interval, age)
+        kept[SKIPS], kept[STRAY], kept[AGE] = min(kept[SKIPS] + 1.0, SURE), 0.0, 0.0
+        return
     kept[STRAY] += 1.0
     if kept[SKIPS] >= SURE and kept[STRAY] < STRAYS:
         return

@@ -52,6 +52,16 @@ def test_mean_between_samples_is_found_once_the_clock_is_known(shape, clock, noi
     assert left < 0.25 * np.std((held - mean)[late])
 
 
+def test_skips_that_a_corner_hides_do_not_double_the_interval() -> None:
+    # A skip every 454.5 samples, of which the triangle's corners hide every second one at first.
+    fine = staircase(lambda t: np.arcsin(np.sin(2.0 * np.pi * t / 32.0)), 1.0022)
+    found = followed(fine[:, 0])
+
+    late = slice(-N // 4, None)
+    mean, held = fine.mean(axis=1)[:-WIDTH][late], fine[:-WIDTH, 0][late]
+    assert np.std(found.mean[WIDTH:][late] - mean) < 0.25 * np.std(held - mean)
+
+
 @pytest.mark.parametrize(
     "signal",
     [
