@@ -180,6 +180,7 @@ class AlarmManager:
                 alarm.shelved_until_ns = min(alarm.shelved_until_ns, now_ns + SHELF_LIFE_NS)
             t_ns = alarm.occasion.t_ns if now_ns is None else now_ns
             if why := let_go(alarm):
+                alarm.occasion = replace(alarm.occasion, t_ns=t_ns)
                 self._publish(alarm, t_ns, Actor(text=why))
                 self._raise_unnamed(t_ns)
         over = [said for said in self._take_announcements() if isinstance(said, Alarm)]

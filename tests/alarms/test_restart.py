@@ -40,6 +40,17 @@ def test_a_flood_ends_with_the_run_and_shows_what_it_grouped():
     assert new.standing() == []
 
 
+def test_what_is_told_after_a_restart_is_in_the_journal():
+    old = flooded()
+    journalled = old.take_changes()
+    new = AlarmManager()
+    said = new.restore(newest(journalled), time_of(40 * SECOND))
+
+    written = {(one.alarm.name, one.alarm.state, one.alarm.t_ns) for one in
+               (*journalled, *new.take_changes())}  # fmt: skip
+    assert {(one.name, one.state, one.t_ns) for one in said} <= written
+
+
 def test_an_acknowledged_flood_is_told_to_be_over():
     old = flooded()
     old.command(order("alarm_flood", "acknowledge", at=30 * SECOND))
