@@ -12,7 +12,7 @@ import numpy as np
 from rigwatch.physics.engine.score import ALIKE
 from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.fit import block_differences
-from rigwatch.workbench.ranking import MUCH_WORSE, SAME, SIMILAR, Ranked
+from rigwatch.workbench.ranking import MATERIAL, MUCH_WORSE, SAME, SIMILAR, Ranked
 
 EQUAL = 2.0
 """Standard deviations by which an effect must be ahead of another, block by block, to rule it out.
@@ -175,8 +175,11 @@ def equal(one: Ranked, other: Ranked, cosine: float) -> bool:
     assert one.fitted is not None
     if not other.accepted:
         return False
-    same = abs(other.held_out_error / one.held_out_error - 1) < NO_DIFFERENCE
-    return bool(same or lead(one, other) < EQUAL)
+    ratio = other.held_out_error / one.held_out_error
+    if abs(ratio - 1) < NO_DIFFERENCE:
+        return True
+    # One that is materially ahead was passed over for its parameters: it is named next.
+    return bool(lead(one, other) < EQUAL and ratio > 1 - MATERIAL)
 
 
 def lead(one: Ranked, other: Ranked) -> float:
