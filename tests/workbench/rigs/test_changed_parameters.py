@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 
 from rigwatch.wire.kernel import kernel
-from rigwatch.workbench.compare import Bench, open_bench
 from rigwatch.workbench.explain.changed_parameters import undetermined_if_parameters_changed
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.ranking import no_progress
-from rigwatch.workbench.study.study import open_study
-from tests.workbench.machine import recorded, studied
-from tests.workbench.verdicts.test_refinements import MODEL, RATE, UNITS, Machine, run
+from tests.workbench.rigs.test_off_middle import bench
+from tests.workbench.verdicts.test_refinements import MODEL, Machine
 
 DRIVEN = (
     MODEL.replace("w*(u - s)", "w*(g*drive - s)")
@@ -54,18 +52,8 @@ def motor(slower: float, weaker: float, rubbing: float) -> Machine:
     return moved
 
 
-def bench(folder: Path, hidden: Machine) -> Bench:
-    """A study with a healthy recording, fitted."""
-    train, held_out, healthy = (run(seed, float(seed < 2), machine=hidden) for seed in range(3))
-    made = studied(folder, DRIVEN, [train], [held_out], UNITS, rates=[RATE, RATE])
-    recorded(folder / "healthy.mcap", healthy, UNITS, RATE)
-    with (made.folder / "study.toml").open("a") as file:
-        file.write('[[healthy]]\nsession = "../healthy.mcap"\n')
-    return open_bench(open_study(made.folder))
-
-
 def test_a_slower_motor_is_no_weaker_one(tmp_path: Path) -> None:
-    slower = bench(tmp_path, motor(0.15, 0.0, 0.0))
+    slower = bench(tmp_path, motor(0.15, 0.0, 0.0), DRIVEN)
     rows, verdict = ranking(slower)
     named = replace(verdict, word="missing_effect")
     assert rows[0].label == "gain@drive"
@@ -83,7 +71,7 @@ def test_a_slower_motor_is_no_weaker_one(tmp_path: Path) -> None:
 def test_an_effect_that_leaves_nothing_is_named(
     tmp_path: Path, weaker: float, rubbing: float, label: str
 ) -> None:
-    rows, verdict = ranking(bench(tmp_path, motor(0.0, weaker, rubbing)))
+    rows, verdict = ranking(bench(tmp_path, motor(0.0, weaker, rubbing), DRIVEN))
 
     assert verdict.word == "missing_effect", verdict.text
     assert rows[0].label == label

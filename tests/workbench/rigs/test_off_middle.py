@@ -42,10 +42,10 @@ def machine(cubic: float, binding: float, dry: float) -> Machine:
     return moved
 
 
-def bench(folder: Path, hidden: Machine) -> Bench:
+def bench(folder: Path, hidden: Machine, model: str = MODEL) -> Bench:
     """A study with a healthy recording, fitted."""
     train, held_out, healthy = (run(seed, float(seed < 2), machine=hidden) for seed in range(3))
-    made = studied(folder, MODEL, [train], [held_out], UNITS, rates=[RATE, RATE])
+    made = studied(folder, model, [train], [held_out], UNITS, rates=[RATE, RATE])
     recorded(folder / "healthy.mcap", healthy, UNITS, RATE)
     with (made.folder / "study.toml").open("a") as file:
         file.write('[[healthy]]\nsession = "../healthy.mcap"\n')
