@@ -161,13 +161,14 @@ def slides(kept: FloatArray) -> bool:
 def seems_to_grow(kept: FloatArray) -> bool:
     """Whether the newest samples show more of a lateness than those before, or dry friction.
 
-    Either explains most of them: of a triangle the two are nearly alike.
+    Either explains most of them, and friction hardly more: of a triangle the two are nearly alike.
     """
     found, before = _best(kept, OF_QUICK), _best(kept, OF_SLOW)
     more = abs(found) > UNSTEADY and before * np.sign(found) > 0.0
     more = more and abs(found) - abs(before) > GROWTH
-    left = max(_left(found, kept, OF_QUICK), _rubbing(kept, OF_QUICK))
-    return more and left < MOST_OF_IT * kept[OF_QUICK + ERRORS]
+    late, rubbed = _left(found, kept, OF_QUICK), _rubbing(kept, OF_QUICK)
+    most = max(late, rubbed) < MOST_OF_IT * kept[OF_QUICK + ERRORS]
+    return more and most and late < RATHER * rubbed
 
 
 @njit()

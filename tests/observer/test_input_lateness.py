@@ -75,6 +75,7 @@ def test_a_lateness_that_friction_explains_as_well_seems_to_grow() -> None:
     assert seems_to_grow(kept)
     assert not seems_to_grow(learnt(0.6 * LATE))
     assert not seems_to_grow(learnt(0.6 * dry, dry=dry))
+    assert not seems_to_grow(learnt(np.linspace(0.0, 3.0, N) * dry, dry=dry))
 
 
 def test_inputs_that_slide_are_unsure_where_an_edge_meets_a_sample() -> None:
