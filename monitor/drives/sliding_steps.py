@@ -189,13 +189,9 @@ def _share(kept: FloatArray) -> float:
 def _follow(way: int, kept: FloatArray) -> None:
     """Take a skip as the next of a regular clock, as a stray one, or as the first of another."""
     age, interval = kept[AGE], kept[INTERVAL]
-    if kept[SKIPS] >= 2.0 and way == kept[WAY] and _regular(age, interval):
-        kept[INTERVAL] += (age / _parts(age, interval) - interval) * FORGET
-        kept[SKIPS], kept[STRAY], kept[AGE] = min(kept[SKIPS] + 1.0, SURE), 0.0, 0.0
-        return
-    if kept[SKIPS] >= 2.0 and way == kept[WAY] and age >= SHORTEST and _regular(interval, age):
-        # Skips at the corners of a drive are not seen: the interval was one of several.
-        kept[INTERVAL] = interval / _parts(interval, age)
+    refined = _refined(age, interval) if kept[SKIPS] >= 2.0 and way == kept[WAY] else 0.0
+    if refined > 0.0:
+        kept[INTERVAL] = refined
         kept[SKIPS], kept[STRAY], kept[AGE] = min(kept[SKIPS] + 1.0, SURE), 0.0, 0.0
         return
     kept[STRAY] += 1.0
@@ -206,6 +202,17 @@ def _follow(way: int, kept: FloatArray) -> None:
     if second and _regular(interval, age):
         kept[SKIPS] = SURE
     kept[WAY], kept[STRAY], kept[AGE] = way, 0.0, 0.0
+
+
+@njit()
+def _refined(age: float, interval: float) -> float:
+    """The interval between skips after a regular one, 0 after another."""
+    if _regular(age, interval):
+        return interval + (age / _parts(age, interval) - interval) * FORGET
+    if age >= SHORTEST and _regular(interval, age):
+        # Skips at the corners of a drive are not seen: the interval was one of several.
+        return interval / _parts(interval, age)
+    return 0.0
 
 
 @njit()

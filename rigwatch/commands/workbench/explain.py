@@ -51,9 +51,9 @@ def _run_one(arguments: argparse.Namespace, folder: Path) -> int:
     study = open_study(folder)
     found = explain(study, progress=say)
     following = next_command(found, f"{folder}")
-    _, elective = suitable(study)
-    if found.verdict == "unknown_effect" and elective:
-        following = RARER.format(count=len(elective), file=folder / "study.toml", study=folder)
+    rarer = suitable(study)[1] if found.verdict == "unknown_effect" else []
+    if rarer:
+        following = RARER.format(count=len(rarer), file=folder / "study.toml", study=folder)
     lines = [*explanation_lines(found), *([f"next: {following}"] if following else [])]
     print_result(arguments, as_data(found), lines)
     return 0

@@ -14,11 +14,10 @@ from rigwatch.workbench.data import (
     NoiseFloor,
     along_motion,
     expected_error,
-    from_residual,
+    held_out_floor,
     predicts_along_motion,
     prepare,
     quiet_scale,
-    repeats_at_once,
     with_elements,
 )
 from rigwatch.workbench.fit import (
@@ -106,14 +105,7 @@ def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench
     base = fit_base(study, data, scale)
     healthy = data.of_healthy
     if healthy is None:
-        floor = from_residual(
-            base.held_out,
-            data.held_out,
-            study.file.period,
-            data.horizon,
-            at_once=repeats_at_once(study),
-        )
-        return Bench(study, data, base, floor, None)
+        return Bench(study, data, base, held_out_floor(study, data, base.held_out), None)
     bare = fit_model(study, healthy, (), study.file.start, base.train.scale, multi_start=True)
     return Bench(study, data, base, _of_healthy(study, data, healthy, base, bare), bare)
 

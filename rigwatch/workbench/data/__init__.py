@@ -10,9 +10,9 @@ from rigwatch.workbench.data.noise import (
     expected_error,
     find_period,
     from_residual,
+    held_out_floor,
     lowered,
     quiet_scale,
-    repeats_at_once,
 )
 from rigwatch.workbench.data.one_rate import ALIKE as RATES_ALIKE
 from rigwatch.workbench.data.proposals import (
@@ -41,6 +41,7 @@ __all__ = [
     "expected_error",
     "find_period",
     "from_residual",
+    "held_out_floor",
     "lowered",
     "parameters_of",
     "port_sizes",
@@ -52,7 +53,6 @@ __all__ = [
     "read_columns",
     "repeat_along_motion",
     "repeat_of",
-    "repeats_at_once",
     "unchanging",
     "with_elements",
     "with_next_rows",

@@ -7,7 +7,7 @@ from typing import Any
 from rigwatch.physics.engine.compile import cores, side_by_side
 from rigwatch.physics.engine.equations import Placement
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.data import Data, NoiseFloor, lowered, repeats_at_once
+from rigwatch.workbench.data import Data, NoiseFloor, lowered
 from rigwatch.workbench.fit import (
     Fitted,
     fit_model,
@@ -122,15 +122,7 @@ def own_floor(study: Study, data: Data, floor: NoiseFloor, row: Ranked) -> Noise
     A floor from a healthy recording or from repeated periods stays.
     """
     assert row.fitted is not None
-    fitted, recording = row.fitted.held_out, data.held_out
-    return lowered(
-        floor,
-        fitted,
-        recording,
-        study.file.period,
-        data.horizon,
-        at_once=repeats_at_once(study),
-    )
+    return lowered(floor, study, data, row.fitted.held_out)
 
 
 def _is_unlike(row: Ranked, other: Ranked) -> bool:

@@ -6,9 +6,9 @@ from rigwatch.workbench.data.noise.noise_floor import (
     NoiseFloor,
     find_period,
     from_residual,
+    held_out_floor,
     lowered,
     quiet_scale,
-    repeats_at_once,
 )
 
 __all__ = [
@@ -17,7 +17,7 @@ __all__ = [
     "expected_error",
     "find_period",
     "from_residual",
+    "held_out_floor",
     "lowered",
     "quiet_scale",
-    "repeats_at_once",
 ]

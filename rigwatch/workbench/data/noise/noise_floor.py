@@ -17,6 +17,7 @@ from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.workbench.data.noise.error_spectrum import ErrorSpectrum
 from rigwatch.workbench.data.noise.quietest_band import quietest_band
 from rigwatch.workbench.data.noise.unrepeated import unrepeated
+from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.study import Study
 
 METHODS = {
@@ -157,28 +158,26 @@ def repeats_at_once(study: Study) -> bool:
     return not study.model.states and bool(study.file.effects)
 
 
-def lowered(
-    floor: NoiseFloor,
-    fitted: Fit,
-    recording: Recording,
-    period: float,
-    horizon: int,
-    *,
-    at_once: bool = False,
-) -> NoiseFloor:
+def held_out_floor(study: Study, data: Data, fitted: Fit) -> NoiseFloor:
+    """The floor of a study's held-out recordings from the residual of a fit to them."""
+    return from_residual(
+        fitted, data.held_out, study.file.period, data.horizon, at_once=repeats_at_once(study)
+    )
+
+
+def lowered(floor: NoiseFloor, study: Study, data: Data, fitted: Fit) -> NoiseFloor:
     """The floor, or that of another fit's quietest band in the channels where it is lower.
 
     Missing physics may fill all bands of a residual, as friction that reverses does. A floor from
     repeated periods or a healthy recording stays.
 
     Args:
-        floor: of another fit to the same recording.
-        fitted, recording, period, horizon, at_once: as in `from_residual`.
+        floor: of another fit to the held-out recordings.
+        study, data, fitted: as in `held_out_floor`.
     """
     if floor.method != "quiet band":
         return floor
-    own = from_residual(fitted, recording, period, horizon, at_once=at_once)
-    return replace(floor, rms=np.minimum(floor.rms, own.rms))
+    return replace(floor, rms=np.minimum(floor.rms, held_out_floor(study, data, fitted).rms))
 
 
 def find_period(recording: Recording) -> int:

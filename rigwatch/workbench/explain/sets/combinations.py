@@ -16,7 +16,7 @@ from rigwatch.physics.engine.compile import side_by_side
 from rigwatch.physics.engine.fit import Fit
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
-from rigwatch.workbench.data import NoiseFloor, from_residual, repeats_at_once
+from rigwatch.workbench.data import NoiseFloor, held_out_floor
 from rigwatch.workbench.explain.verdict import LITTLE_MORE
 from rigwatch.workbench.fit import Fitted, continued_train_error, fit_model
 from rigwatch.workbench.ranking import (
@@ -84,14 +84,7 @@ def floor_of(bench: Bench, fitted: Fitted) -> NoiseFloor:
     """
     if bench.data.of_healthy is not None or bench.floor.method != "quiet band":
         return bench.floor
-    study, data = bench.study, bench.data
-    return from_residual(
-        fitted.held_out,
-        data.held_out,
-        study.file.period,
-        data.horizon,
-        at_once=repeats_at_once(study),
-    )
+    return held_out_floor(bench.study, bench.data, fitted.held_out)
 
 
 def reaches_noise(bench: Bench, fitted: Fitted) -> bool:
