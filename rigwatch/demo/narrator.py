@@ -112,7 +112,10 @@ class Narrator:
                 self._ended = None  # the fault persists, under its name
             self.alarms.append(alarm)
             self._say(f"{self._time(alarm.seq)} ALARM: {alarm.cause}{self._delay(alarm)}")
-            self._say(f"            what to do: {alarm.guidance}")
+            if alarm.name not in OF_THE_RIG:
+                self._say("            (about the measuring chain: none of the faults announced)")
+            guidance = alarm.guidance.replace("CONFIG", self._config)
+            self._say(f"            what to do: {guidance}")
             if alarm.name != NAMELESS:
                 self._say(f"            all alarms: $ rigwatch alarms {self._config}")
         elif alarm.name in {told.name for told in self.alarms} and alarm.state in ENDED:
@@ -133,8 +136,9 @@ class Narrator:
     def _tell_end(self) -> None:
         """Report the end of an alarm; that of a departure only if no named fault replaced it."""
         if self._ended is not None:
-            name = self._ended.name.replace("_", " ")
-            self._say(f"{self._time(self._ended.seq)} {name}: the condition has gone")
+            name = self._ended.name
+            what = name.replace("_", " ") if name in OF_THE_RIG else self._ended.cause
+            self._say(f"{self._time(self._ended.seq)} {what}: the condition has gone")
             self._tell_how_to_acknowledge(self._ended)
             self._ended = None
 

@@ -1,6 +1,7 @@
 """The demonstration: `rigwatch up` runs the rig, and events are reported as they happen."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -62,6 +63,13 @@ class Outcome:
         }
 
 
+def not_activated() -> str:
+    """The script that puts this virtual environment's commands on the path, "" if none need."""
+    script = Path(sys.prefix) / "bin" / "activate"
+    in_use = "VIRTUAL_ENV" in os.environ or not script.is_file()
+    return "" if in_use else relative(script)
+
+
 class Show:
     """One run of the demonstration.
 
@@ -88,6 +96,8 @@ class Show:
             after_named: time from the naming of dry friction to the end [s].
         """
         self._say(f"starting the rig: $ rigwatch up {relative(self._rig)}")
+        if activate := not_activated():
+            self._say(f"            (for commands in another terminal: $ . {activate})")
         self._up = subprocess.Popen(
             [sys.executable, "-m", "rigwatch", "up", str(self._rig), "--json"],
             stdout=subprocess.PIPE,

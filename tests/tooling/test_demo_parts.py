@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -197,6 +198,20 @@ def test_a_departure_that_gets_a_name_has_not_gone() -> None:
     narrator.alarm(alarm("departure", 8000, "normal"))
     narrator.judged(8300)
     assert "departure: the condition has gone" in said[-1]
+
+
+def test_an_alarm_about_the_measuring_chain_is_no_fault_of_the_plan() -> None:
+    said: list[str] = []
+    narrator = narrator_to(said)
+    line = replace(alarm("stale", 5200), guidance="Run `rigwatch doctor CONFIG`.")
+    narrator.alarm(line)
+    assert "none of the faults announced" in said[-3]
+    assert "CONFIG" not in said[-2]
+    narrator.alarm(replace(line, state="cleared_unacknowledged", seq=5300))
+    assert any("Something else.: the condition has gone" in told for told in said)
+    said.clear()
+    narrator.alarm(alarm("other_fault", 6000))
+    assert not any("none of the faults announced" in told for told in said)
 
 
 def test_a_whole_recording_with_the_alarm_has_nothing_to_complain_about(

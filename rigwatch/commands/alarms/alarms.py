@@ -37,7 +37,8 @@ def run(arguments: argparse.Namespace) -> int:
         elif arguments.json:
             print(json.dumps([json_fields(alarm) for alarm in standing], indent=2))
         else:
-            print("\n\n".join(as_text(alarm) for alarm in standing) or "no active alarms")
+            told = "\n\n".join(as_text(alarm, arguments.config) for alarm in standing)
+            print(told or "no active alarms")
     finally:
         bus.close()
     return 0
@@ -73,6 +74,7 @@ def as_line(alarm: "Alarm") -> str:
     return f"{when:%Y-%m-%d %H:%M:%S} {alarm.severity:8} {alarm.name}: {state}{who}{mark}"
 
 
-def as_text(alarm: "Alarm") -> str:
-    """The alarm with its cause and guidance."""
-    return f"{as_line(alarm)}\n    {alarm.cause}\n    {alarm.guidance}"
+def as_text(alarm: "Alarm", config: Path) -> str:
+    """The alarm with its cause, and its guidance with the rig's file in the commands."""
+    guidance = alarm.guidance.replace("CONFIG", str(config))
+    return f"{as_line(alarm)}\n    {alarm.cause}\n    {guidance}"
