@@ -10,11 +10,15 @@ from collections.abc import Generator
 import pytest
 from hypothesis import Phase, settings
 
+from tests.made_once import SHARED
+
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the commands do, before NumPy is imported
-# Processes of rigs make the secret of the account there.
-if "XDG_STATE_HOME" not in os.environ:
-    os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="rigwatch-state-")
-    atexit.register(shutil.rmtree, os.environ["XDG_STATE_HOME"], ignore_errors=True)
+# Processes of rigs make the secret of the account in the first, and workers what they share in the
+# other; they inherit both.
+for variable in ("XDG_STATE_HOME", SHARED):
+    if variable not in os.environ:
+        os.environ[variable] = tempfile.mkdtemp(prefix="rigwatch-tests-")
+        atexit.register(shutil.rmtree, os.environ[variable], ignore_errors=True)
 settings.register_profile("rigwatch", deadline=None, derandomize=os.environ.get("CI") == "true")
 settings.register_profile(
     "mutation",  # of a change in the code it matters only whether a test fails, not how simply

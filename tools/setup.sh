@@ -70,12 +70,13 @@ for lock in "$@"; do
     { install "$lock" || { cat "$venv/setup-errors.txt" >&2 && echo "setup failed"; }; } \
         | progress "$packages"
 done
-# On all cores, and not the packages' own tests, which are a quarter of all. Some packages hold files
-# for another Python.
-"$venv/bin/python" -m compileall -qq -j 0 -x '/site-packages/.*/tests?/' "$venv/lib" || true
-# The project comes with what it runs with. Further locks leave it alone: it may be running.
+# The project comes with what it runs with. Further locks leave it alone: it may be running. Python
+# compiles of their packages what is imported, less than half.
 case " $* " in
 *" requirements/lock.txt "*)
+    # On all cores, and not the packages' own tests, which are a quarter of all. Some packages hold
+    # files for another Python.
+    "$venv/bin/python" -m compileall -qq -j 0 -x '/site-packages/.*/tests?/' "$venv/lib" || true
     "$venv/bin/python" -m pip install --quiet --quiet --no-deps --no-build-isolation --editable .
     ;;
 esac

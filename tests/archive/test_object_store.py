@@ -6,10 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-import boto3
 import pytest
-from moto.server import DomainDispatcherApplication, create_backend_app
-from werkzeug.serving import make_server
 
 from rigwatch.archive import Store, ask, index, query, retain
 from rigwatch.batch import executor_on
@@ -43,6 +40,10 @@ class Sometimes:
 @pytest.fixture(scope="module")
 def served() -> Iterator[tuple[str, Sometimes]]:
     """Address of the server, and what makes it fail."""
+    # Loaded by the worker that uses it: every worker reads this file.
+    from moto.server import DomainDispatcherApplication, create_backend_app
+    from werkzeug.serving import make_server
+
     application = Sometimes(DomainDispatcherApplication(create_backend_app))
     server = make_server("127.0.0.1", 0, application, threaded=True)
     thread = threading.Thread(target=server.serve_forever, daemon=True)
@@ -60,6 +61,8 @@ def bucket(
     request: pytest.FixtureRequest,
 ) -> tuple[Store, Store]:
     """The same sessions in a folder and in a bucket."""
+    import boto3
+
     address, _ = served
     for name, value in (
         ("AWS_ENDPOINT_URL", address),

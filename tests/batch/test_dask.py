@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from distributed import versions
 
 import rigwatch
 from rigwatch.batch import executor_on
@@ -85,6 +84,8 @@ def test_a_command_runs_on_the_cluster(cluster, tmp_path, capsys):
 
 
 def test_a_scheduler_of_another_version_is_one_sentence(cluster, monkeypatch, recwarn):
+    from distributed import versions  # by the worker that uses it: every worker reads this file
+
     real = versions.version("distributed")
     of_this_process = versions.get_package_info
     monkeypatch.setattr(

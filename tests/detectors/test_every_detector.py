@@ -109,6 +109,7 @@ def test_what_is_not_finite_never_enters(rig, new, bad, channel):
     assert np.isfinite(rows[0, 3020:]).all()
 
 
+@pytest.mark.kernels
 def test_flagged_samples_are_not_judged_and_do_no_harm(rig, new):
     healthy = rig.with_fault("coulomb", 0.0, 20.0, seed=10)
     flags = np.zeros(healthy.shape, np.uint8)

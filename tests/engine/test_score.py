@@ -78,6 +78,7 @@ def test_a_direction_is_the_derivative_of_the_composed_model(name, port):
     assert wrong <= 2e-2 * np.sqrt(np.mean(expected**2))
 
 
+@pytest.mark.kernels
 def test_the_hidden_effect_ranks_first():
     friction = Placement("coulomb", library()["coulomb"], "load")
     plant, u = compile_system(compose(MODEL, [friction])), excitation()

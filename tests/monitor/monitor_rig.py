@@ -1,7 +1,5 @@
 """A commissioned model of the simulated rig and recordings of it, made once for this folder."""
 
-from functools import cache
-
 import numpy as np
 
 from monitor.commissioning.commission import commission
@@ -11,6 +9,7 @@ from monitor.signals.recordings import recording_of
 from rigwatch.wire.messages.message_types import Column, SampleBlock
 from sim_plant.excitation import Chirp, Shape, Sine
 from sim_plant.scenario import Event, Scenario, ScenarioRun
+from tests.made_once import made_once
 
 RATE = 256.0
 UNITS = {"voltage": "V", "position": "m", "acceleration": "m/s^2"}
@@ -41,7 +40,7 @@ def fault(effect: str, value: float, at_s: float = 4.0) -> tuple[Event, ...]:
     return (Event(at_s=at_s, effect=effect, value=value),)
 
 
-@cache
+@made_once
 def model() -> RigModel:
     """Commissioned from a chirp, a healthy reference and a known friction."""
     sweep = Chirp(amplitude=0.7, start=0.5, stop=20.0, length_s=16.0)

@@ -1,7 +1,5 @@
 """The observer scheme on the project's own simulated rig: recordings and a model, made once."""
 
-from functools import cache
-
 import numpy as np
 
 from monitor.commissioning.equations import commission_equations
@@ -11,6 +9,7 @@ from monitor.signals.recordings import Recording, Role, recording_of
 from rigwatch.wire.messages.message_types import Alarm, Column, SampleBlock
 from sim_plant.excitation import Chirp, Shape, Sine
 from sim_plant.scenario import Event, Scenario, ScenarioRun
+from tests.made_once import made_once
 
 RATE = 256.0
 UNITS = {"voltage": "V", "position": "m", "acceleration": "m/s^2"}
@@ -49,7 +48,7 @@ def healthy_recordings() -> list[Recording]:
     ]
 
 
-@cache
+@made_once
 def model() -> RigModel:
     """Commissioned from healthy recordings alone."""
     return commission_equations(healthy_recordings())

@@ -256,6 +256,7 @@ def test_a_healthy_rig_stays_quiet(drive: Sine) -> None:
     assert not FAULTS & raised(watched(run(drive, 20.0, seed=33))).keys()
 
 
+@pytest.mark.kernels
 @pytest.mark.long
 def test_block_sizes_change_no_bit_of_a_small_fault() -> None:
     drop = run(SINE, 9.0, (Event(at_s=5.0, effect="supply_drop", value=0.008),), seed=31)

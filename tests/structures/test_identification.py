@@ -29,6 +29,7 @@ def same_steps(structure, truth, h=0.01, duration=10.0):
     return Record(h, {f"x{n}": outputs[:, n - 1] for n in range(1, 9)})
 
 
+@pytest.mark.kernels
 def test_classical_steps_give_the_iterations_of_the_document():
     made = same_steps(antenna(), TRUTH)
     found = identify("quasilinearization", antenna(), made, integrator="runge-kutta")
@@ -51,7 +52,9 @@ def test_an_integrator_that_is_not_there_is_refused(clean):
         identify("quasilinearization", antenna(), clean, integrator="euler")
 
 
-@pytest.mark.parametrize("method", ["direct", "kalman", "shooting"])
+@pytest.mark.parametrize(
+    "method", ["direct", pytest.param("kalman", marks=pytest.mark.kernels), "shooting"]
+)
 def test_a_clean_record_gives_the_truth(method, clean):
     found = identify(method, antenna(), clean)
     assert found.converged

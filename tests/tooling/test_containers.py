@@ -93,6 +93,7 @@ def test_every_service_runs_and_passes_its_own_health_check_and_stops_when_asked
             log = (host.folder / f"{name}.log").read_text()
             assert host.running[name].poll() is None, f"{name} ended: {log}"
             assert time.monotonic() < deadline, f"{name}: {done.stdout}{done.stderr}{log}"
+            time.sleep(1.0)  # as a container host does, which leaves the processor to the services
     assert set(host.stop().values()) == {0}
     assert list((host.folder / "state" / "sessions").glob("*/*.mcap"))
 

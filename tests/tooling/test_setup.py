@@ -136,7 +136,7 @@ def test_the_set_up_says_how_far_it_is(environment: Path, bare_path: Path, tmp_p
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_only_the_lock_of_the_project_puts_the_project_in(
+def test_only_the_lock_of_the_project_puts_the_project_in_and_is_compiled_as_a_whole(
     environment: Path, bare_path: Path
 ) -> None:
     python, told = environment / "bin" / "python", environment / "told"
@@ -146,6 +146,7 @@ def test_only_the_lock_of_the_project_puts_the_project_in(
         done = run_tool("setup.sh", str(environment), f"requirements/{lock}", path=bare_path)
         assert done.returncode == 0, done.stderr
         assert (" --editable ." in told.read_text()) == wanted
+        assert ("-m compileall " in told.read_text()) == wanted
 
 
 def test_a_set_up_that_fails_says_why_and_ends_with_an_error(

@@ -2,10 +2,13 @@
 
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from tests.made_once import SHARED, made_once
 from tools.failed_tests import failed_tests
 
 
@@ -28,6 +31,25 @@ def group(request: pytest.FixtureRequest) -> str:
     marker = request.node.get_closest_marker("xdist_group")
     assert marker is not None
     return str(marker.args[0])
+
+
+def test_what_workers_need_at_the_same_time_is_made_by_one_of_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(SHARED, f"{tmp_path}")
+    numbers = iter(range(4))
+
+    def make() -> np.ndarray:
+        return np.full(100_000, next(numbers))
+
+    # Each worker decorates the function, and finds what it has found before in its own memory.
+    workers = [made_once(make) for _ in range(4)]
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda worker: worker(), workers))
+
+    assert all(np.array_equal(one, found[0]) for one in found)
+    assert next(numbers) == 1
+    assert workers[0]() is found[0]
 
 
 def test_what_fails_in_a_group_is_found_again(tmp_path: Path) -> None:

@@ -6,18 +6,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-import pandas as pd
 import polars as pl
 import pytest
-import xarray as xr
 
 import rigwatch
 from rigwatch.wire.errors import ImportDataError, ModelError
 from tests.workbench.conftest import CONFIGS
 
-mpl.use("Agg")
+# Packages that take long to load are imported where they are used: every worker reads this file.
 NOTEBOOKS = Path(__file__).parents[3] / "docs" / "notebooks"
 RATE = 100.0
 MODEL = """
@@ -47,7 +44,15 @@ def run(seed: int) -> dict[str, np.ndarray]:
     return {"time[s]": time, "force[N]": force, "speed[m/s]": np.array(speed) + noise}
 
 
+@pytest.fixture(autouse=True)
+def drawn_nowhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Plots need no screen."""
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+
+
 def as_pandas(table: dict[str, np.ndarray]) -> Any:
+    import pandas as pd
+
     return pd.DataFrame(table)
 
 
@@ -56,6 +61,8 @@ def as_polars(table: dict[str, np.ndarray]) -> Any:
 
 
 def as_xarray(table: dict[str, np.ndarray]) -> Any:
+    import xarray as xr
+
     time, force, speed = table.values()
     return xr.Dataset(
         {"force": ("time", force, {"units": "N"}), "speed": ("time", speed, {"units": "m/s"})},
@@ -64,6 +71,8 @@ def as_xarray(table: dict[str, np.ndarray]) -> Any:
 
 
 def as_times(table: dict[str, np.ndarray]) -> Any:
+    import pandas as pd
+
     frame = pd.DataFrame(table).drop(columns="time[s]")
     frame.index = pd.date_range("2026-01-01", periods=len(frame), freq="10ms", name="time")
     return frame

@@ -50,6 +50,7 @@ def test_a_nonlinearity_answers_on_its_own_kind_of_lines(hidden: str, lines: str
     assert found[f"{lines} multiples"].share > 0.8
 
 
+@pytest.mark.kernels
 def test_dry_friction_changes_sides_with_the_direction() -> None:
     bench = opened(multisine(MANY, 4.0), "coulomb")
     found = {r.name: r for r in regions(bench, "direction", "acceleration")}
