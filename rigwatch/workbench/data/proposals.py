@@ -23,7 +23,7 @@ TRAIN_SHARE = 0.6
 LEAST_CHANGE = 0.05
 """Least share of the changes of what drives a model on either side of a split."""
 ONE_IN = 4
-"""Of so many recordings one is held out, and at least one."""
+"""Of so many recordings one is held out, rounded, and at least one: of six none decides alone."""
 GOLDEN = 0.5 * (5**0.5 - 1)
 """Golden ratio: steps of this share of a series spread evenly over it, for any number of steps."""
 ENERGY, BEYOND = 0.999, 4.0
@@ -68,7 +68,7 @@ def proposed_split(
     """Training parts and held-out parts.
 
     Of several recordings, the one whose excitation exceeds the others' least is held out, and of
-    eight and more a quarter of them; a single one is split into two within its motion.
+    six and more about a quarter of them; a single one is split into two within its motion.
 
     Args:
         tables: the recordings.
@@ -120,12 +120,12 @@ def _changes(table: Columns, names: Sequence[str]) -> FloatArray:
 
 
 def _deciding(tables: Sequence[Columns], names: Sequence[str]) -> list[int]:
-    """Recordings to hold out, one in four of many: those whose excitation exceeds least.
+    """Recordings to hold out, about one in four: those whose excitation exceeds least.
 
     Of equals, logs of a series of settings, neighbours are alike: the choice is spread over them.
     """
     excess = [_excess(tables, names, index) for index in range(len(tables))]
-    count = max(len(tables) // ONE_IN, 1)
+    count = max((len(tables) + ONE_IN // 2) // ONE_IN, 1)
     limit = sorted(excess)[count - 1]
     certain = [index for index, own in enumerate(excess) if own < limit]
     equal = [index for index, own in enumerate(excess) if own == limit]

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from rigwatch.workbench.compare.compare import compare
 from rigwatch.workbench.data import proposed_split, unchanging
@@ -39,6 +40,14 @@ def test_a_log_in_which_nothing_changes_is_not_held_out() -> None:
     assert held_out.recording == 2
     assert unchanging(tables[1], ["u"], Part(1)) == ["u"]
     assert not unchanging(tables[0], ["u"], Part(0))
+
+
+@pytest.mark.parametrize(("logs", "held_out"), [(2, 1), (5, 1), (6, 2), (8, 2), (16, 4)])
+def test_of_six_logs_no_single_one_decides(logs: int, held_out: int) -> None:
+    waves = [np.sin(np.arange(1000) / 100 + phase) for phase in range(logs)]
+    train, decide = proposed_split([logged(wave) for wave in waves], ["u"])
+    assert len(decide) == held_out
+    assert len(train) == logs - held_out
 
 
 def test_an_input_that_never_changes_is_told(tmp_path: Path) -> None:
