@@ -7,13 +7,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 from scipy.signal import welch
 
-from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.workbench.data.columns import Columns, bridged
 
 QUIET = 0.02
 """Change over the range of a signal up to which it counts as at rest."""
+ANSWERED, NOISY = 0.05, 5.0
+"""The same of an output, which a slow sensor's drift moves too, and over its median change from
+sample to sample, about the standard deviation of white noise."""
 MIN_REST_SHARE = 0.05
 """Smallest share of a recording at rest at an end for that end to be cut off."""
 KEPT = 20
@@ -46,24 +50,46 @@ class Part:
     end: float = float("inf")
 
 
-def moving(table: Columns, names: Sequence[str]) -> tuple[float, float]:
-    """Start and end of the motion [s]; long ends at rest carry no information."""
-    signals = [bridged(table.values[name]) for name in names]
+def moving(
+    table: Columns, driving: Sequence[str], answers: Sequence[str] = ()
+) -> tuple[float, float]:
+    """Start and end of the motion [s]; long ends at rest carry no information.
+
+    A machine that still answers the last change of what drives it is not at rest.
+
+    Args:
+        table: the recording.
+        driving: names of the channels that drive the model.
+        answers: those of its outputs, with noise.
+    """
     restless = np.zeros(len(table), bool)
-    for signal in signals:
-        limit = QUIET * max(float(np.ptp(signal)), 1e-300)
-        restless |= (np.abs(signal - signal[0]) > limit) & (np.abs(signal - signal[-1]) > limit)
+    for name in driving:
+        signal = bridged(table.values[name])
+        restless |= _away(signal, QUIET * float(np.ptp(signal)), signal[0], signal[-1])
+    for name in answers:
+        signal = bridged(table.values[name])
+        noise = float(np.median(np.abs(np.diff(signal))))
+        for length in (1, KEPT):  # fast answers, and slow ones in noise
+            means = uniform_filter1d(signal, length, mode="nearest")
+            limit = max(ANSWERED * float(np.ptp(means)), NOISY * noise / np.sqrt(length))
+            restless |= _away(means, limit, np.median(means[:KEPT]), np.median(means[-KEPT:]))
     (at,) = np.nonzero(restless)
     if not len(at):
         return 0.0, float("inf")
-    first, last, count = max(int(at[0]) - KEPT, 0), int(at[-1]) + KEPT, len(table)
-    start = first * table.dt if first > MIN_REST_SHARE * count else 0.0
-    end = last * table.dt if count - last > MIN_REST_SHARE * count else float("inf")
+    begin, stop, count = max(int(at[0]) - KEPT, 0), int(at[-1]) + KEPT, len(table)
+    start = begin * table.dt if begin > MIN_REST_SHARE * count else 0.0
+    end = stop * table.dt if count - stop > MIN_REST_SHARE * count else float("inf")
     return start, end
 
 
+def _away(signal: FloatArray, limit: float, first: float, last: float) -> BoolArray:
+    """Samples at which a signal is neither where it began nor where it ends."""
+    least = max(limit, 1e-300)
+    return np.asarray((np.abs(signal - first) > least) & (np.abs(signal - last) > least))
+
+
 def proposed_split(
-    tables: Sequence[Columns], names: Sequence[str]
+    tables: Sequence[Columns], names: Sequence[str], answers: Sequence[str] = ()
 ) -> tuple[list[Part], list[Part]]:
     """Training parts and held-out parts.
 
@@ -73,8 +99,9 @@ def proposed_split(
     Args:
         tables: the recordings.
         names: of the channels that drive the model.
+        answers: names of its outputs, which may move on when what drives it rests.
     """
-    parts = [Part(index, *moving(table, names)) for index, table in enumerate(tables)]
+    parts = [Part(index, *moving(table, names, answers)) for index, table in enumerate(tables)]
     if len(tables) > 1:
         decide = _deciding(tables, names)
         return [p for p in parts if p.recording not in decide], [parts[at] for at in decide]
