@@ -588,6 +588,28 @@ def test_where_training_and_held_out_disagree_nothing_is_named_alone() -> None:
     assert judge(base(), [best, other], QUIET).word == "missing_effect"
 
 
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        pytest.param({}, True, id="of other physics"),
+        pytest.param({"refines": "sag"}, False, id="a refinement"),
+        pytest.param({"family": "drive"}, False, id="of one family"),
+        pytest.param({"free": 1}, False, id="as simple"),
+    ],
+)
+def test_what_leads_with_more_parameters_is_a_rival_where_rivals_are_told(
+    more: dict[str, Any], told: bool
+) -> None:
+    # An error that differs from block to block leaves the two equal held out.
+    simple = trained(row("sag@drive", 2.0, jitter=3.0, family="drive"), 2.6)
+    leader = trained(row("limit@drive", 1.9, jitter=-3.0, **{"free": 2, **more}), 2.5)
+    other = trained(row("rate@drive", 2.8, accepted=False), 1.5)
+    found = judge(base(), [simple, leader, other], QUIET)
+    assert found.word == "undetermined"
+    assert ("limit@drive" in found.rivals) == told
+    assert ("of those as simple (limit@drive lowers it further)" in found.text) == told
+
+
 def _with_training_error(of: Ranked, error: float) -> None:
     assert of.fitted is not None
     of.fitted = replace(of.fitted, train=base(error).train)
