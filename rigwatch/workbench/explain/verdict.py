@@ -142,21 +142,17 @@ def _doubt(
         leads += f" of those as simple ({ahead.label} lowers it further)"
     trusted = floor.reached(best.fitted.held_out)
     if not trusted and (elsewhere := explaining_training(base, best, rows)):
-        return "undetermined", elsewhere, (
-            f"{leads}, but {', '.join(elsewhere)} explains more than {CONTRADICTED:g} times as much"
-            " of the training error"
-        )  # fmt: skip
+        much = f"more than {CONTRADICTED:g} times as much of the training error"
+        return "undetermined", elsewhere, f"{leads}, but {', '.join(elsewhere)} explains {much}"
     if better := explaining_all(base, best, rows, floor):
-        text = f"{leads}, but {', '.join(better)} explains more of all recordings together"
-        return "undetermined", better, text
+        more = "more of all recordings together"
+        return "undetermined", better, f"{leads}, but {', '.join(better)} explains {more}"
     if hardly_trains(base, best, floor):
         text = f"the best known effect, {best.label}, leaves nearly all of the training error"
         return "unknown_effect", (), text
     if others := favoured_by_training(base, best, rows, floor):
-        return "undetermined", others, (
-            f"{leads}, but {', '.join(others)} explains more of the training error, much of which"
-            f" {best.label} leaves"
-        )  # fmt: skip
+        more = f"more of the training error, much of which {best.label} leaves"
+        return "undetermined", others, f"{leads}, but {', '.join(others)} explains {more}"
     return None
 
 

@@ -154,11 +154,11 @@ def _named_lines(found: Explanation) -> list[str]:
         return []
     best = found.ranking[0]
     fitted = [
-        f"{name} = {shown(value)}{f' ({value.note})' if value.note else ''}"
+        f"{name} = {shown(value)}{f', {value.note}' if value.note else ''}"
         for name, value in best.parameters.items()
         if value.interval is not None
     ]
-    return [f"  {best.effect}@{best.port}: {', '.join(fitted)}"] if fitted else []
+    return [f"  {best.effect}@{best.port}: {'; '.join(fitted)}"] if fitted else []
 
 
 def next_command(found: Explanation, study: str) -> str:

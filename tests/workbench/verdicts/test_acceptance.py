@@ -154,7 +154,7 @@ def test_a_strength_that_only_its_shape_leaves_open_is_told_so(
     assert strength.interval is not None
     assert (strength.interval[0] <= 0 <= strength.interval[1]) == bool(note)
     assert strength.note == note
-    assert (f"({note})" in explanation_lines(found)[3]) == bool(note)
+    assert (f", {note};" in explanation_lines(found)[3]) == bool(note)
 
 
 def test_what_helps_a_little_is_not_called_the_answer(tmp_path: Path) -> None:
