@@ -578,6 +578,29 @@ def test_a_late_input_is_a_late_output_where_there_is_one_of_each(
     assert ("delay@drive" in found.members) is not told_apart
 
 
+@pytest.mark.parametrize(
+    ("cosine", "error", "told_apart"),
+    [
+        pytest.param(0.9999, 1.005, False, id="a trace less"),
+        pytest.param(0.99, 1.005, True, id="the other input moves"),
+        pytest.param(0.9999, 1.05, True, id="clearly less"),
+    ],
+)
+def test_beside_an_input_that_hardly_moves_a_late_input_is_a_late_output(
+    cosine: float, error: float, *, told_apart: bool
+) -> None:
+    sensor = best("delay@sensor", kind="sensor", shift=True, cosines={"delay@drive": cosine})
+    drive = row(
+        "delay@drive", error, kind="actuator", shift=True, jitter=0.0,
+        cosines={"delay@sensor": cosine},
+    )  # fmt: skip
+    assert sensor.fitted is not None
+    sensor.fitted.compiled.system.model.driving = lambda: ("power", "room")
+    found = judge(base(), [sensor, drive], PERIODS)
+    assert found.word == "missing_effect"
+    assert ("delay@drive" in found.members) is not told_apart
+
+
 def test_where_training_and_held_out_disagree_nothing_is_named_alone() -> None:
     best, other = row("valve_hysteresis@drive", 2.0), row("stribeck@shaft", 2.8, accepted=False)
     _with_training_error(best, 2.6)
