@@ -100,8 +100,10 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
     members, rivals = [*verdict.members, *verdict.rivals], list(verdict.rivals)
     experiment = None
     # Excitations are compared by simulating the motion; a model along the measured motion cannot.
-    if verdict.best is not None and rivals and not bench.data.along_motion:
-        experiment = propose(bench, verdict.best, [row for row in rows if row.label in rivals])
+    # A rival of a set may have no row of its own among the single effects.
+    others = [row for row in rows if row.label in rivals]
+    if verdict.best is not None and others and not bench.data.along_motion:
+        experiment = propose(bench, verdict.best, others)
     more: dict[str, float] = {}
     compared = comparison(bench)
     named = verdict.word in STRENGTH_TOLD
