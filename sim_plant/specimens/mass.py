@@ -109,6 +109,19 @@ class SecondMass:
         return pull
 
 
+class SpringAndDashpot:
+    """A dashpot on a spring: the spring stretches until the dashpot follows."""
+
+    def __init__(self, stiffness: float, damping: float) -> None:
+        self._k, self._c, self._stretched = stiffness, damping, 0.0
+
+    def __call__(self, _t: float, _x: float, v: float, h: float) -> float:
+        """The spring's force, which the dashpot carries too."""
+        pull = self._k * self._stretched
+        self._stretched += h * (v - pull / self._c)
+        return -pull
+
+
 def _bumper(x: float) -> float:
     """Rubber that is touched 6 cm from the middle."""
     return -math.copysign(8e3 * max(abs(x) - 0.06, 0.0) ** 3, x)
@@ -120,6 +133,8 @@ CONTACTS: dict[str, Callable[[], Contact]] = {
     "viscous_behind_play": lambda: InAFork(0.06, lambda moved, h: -1.5 * moved / h),
     "viscous_beyond_clearance": lambda: lambda t, x, v, h: -2.5 * v if abs(x) > 0.06 else 0.0,
     "cubic_stiffness_beyond_clearance": lambda: lambda t, x, v, h: _bumper(x),
+    "maxwell_element": lambda: SpringAndDashpot(40.0, 4.0),
+    "digressive_damping": lambda: lambda t, x, v, h: -4.0 * min(max(v, -0.2), 0.2),
     "attached_mass": lambda: SecondMass(0.1, 11.0, 0.06),
     "stop_above": lambda: lambda t, x, v, h: -90.0 * (x - 0.09) if x > 0.09 else 0.0,
     "stop_below": lambda: lambda t, x, v, h: -90.0 * (x + 0.09) if x < -0.09 else 0.0,

@@ -7,13 +7,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 from scipy.signal import welch
 
-from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.workbench.data.columns import Columns, bridged
 
 QUIET = 0.02
 """Change over the range of a signal up to which it counts as at rest."""
+ANSWERED, NOISY = 0.05, 5.0
+"""The same of an output, which a slow sensor's drift moves too, and over its median change from
+sample to sample, about the standard deviation of white noise."""
 MIN_REST_SHARE = 0.05
 """Smallest share of a recording at rest at an end for that end to be cut off."""
 KEPT = 20
@@ -23,7 +27,7 @@ TRAIN_SHARE = 0.6
 LEAST_CHANGE = 0.05
 """Least share of the changes of what drives a model on either side of a split."""
 ONE_IN = 4
-"""Of so many recordings one is held out, and at least one."""
+"""Of so many recordings one is held out, rounded, and at least one: of six none decides alone."""
 GOLDEN = 0.5 * (5**0.5 - 1)
 """Golden ratio: steps of this share of a series spread evenly over it, for any number of steps."""
 ENERGY, BEYOND = 0.999, 4.0
@@ -46,35 +50,58 @@ class Part:
     end: float = float("inf")
 
 
-def moving(table: Columns, names: Sequence[str]) -> tuple[float, float]:
-    """Start and end of the motion [s]; long ends at rest carry no information."""
-    signals = [bridged(table.values[name]) for name in names]
+def moving(
+    table: Columns, driving: Sequence[str], answers: Sequence[str] = ()
+) -> tuple[float, float]:
+    """Start and end of the motion [s]; long ends at rest carry no information.
+
+    A machine that still answers the last change of what drives it is not at rest.
+
+    Args:
+        table: the recording.
+        driving: names of the channels that drive the model.
+        answers: those of its outputs, with noise.
+    """
     restless = np.zeros(len(table), bool)
-    for signal in signals:
-        limit = QUIET * max(float(np.ptp(signal)), 1e-300)
-        restless |= (np.abs(signal - signal[0]) > limit) & (np.abs(signal - signal[-1]) > limit)
+    for name in driving:
+        signal = bridged(table.values[name])
+        restless |= _away(signal, QUIET * float(np.ptp(signal)), signal[0], signal[-1])
+    for name in answers:
+        signal = bridged(table.values[name])
+        noise = float(np.median(np.abs(np.diff(signal))))
+        for length in (1, KEPT):  # fast answers, and slow ones in noise
+            means = uniform_filter1d(signal, length, mode="nearest")
+            limit = max(ANSWERED * float(np.ptp(means)), NOISY * noise / np.sqrt(length))
+            restless |= _away(means, limit, np.median(means[:KEPT]), np.median(means[-KEPT:]))
     (at,) = np.nonzero(restless)
     if not len(at):
         return 0.0, float("inf")
-    first, last, count = max(int(at[0]) - KEPT, 0), int(at[-1]) + KEPT, len(table)
-    start = first * table.dt if first > MIN_REST_SHARE * count else 0.0
-    end = last * table.dt if count - last > MIN_REST_SHARE * count else float("inf")
+    begin, stop, count = max(int(at[0]) - KEPT, 0), int(at[-1]) + KEPT, len(table)
+    start = begin * table.dt if begin > MIN_REST_SHARE * count else 0.0
+    end = stop * table.dt if count - stop > MIN_REST_SHARE * count else float("inf")
     return start, end
 
 
+def _away(signal: FloatArray, limit: float, first: float, last: float) -> BoolArray:
+    """Samples at which a signal is neither where it began nor where it ends."""
+    least = max(limit, 1e-300)
+    return np.asarray((np.abs(signal - first) > least) & (np.abs(signal - last) > least))
+
+
 def proposed_split(
-    tables: Sequence[Columns], names: Sequence[str]
+    tables: Sequence[Columns], names: Sequence[str], answers: Sequence[str] = ()
 ) -> tuple[list[Part], list[Part]]:
     """Training parts and held-out parts.
 
     Of several recordings, the one whose excitation exceeds the others' least is held out, and of
-    eight and more a quarter of them; a single one is split into two within its motion.
+    six and more about a quarter of them; a single one is split into two within its motion.
 
     Args:
         tables: the recordings.
         names: of the channels that drive the model.
+        answers: names of its outputs, which may move on when what drives it rests.
     """
-    parts = [Part(index, *moving(table, names)) for index, table in enumerate(tables)]
+    parts = [Part(index, *moving(table, names, answers)) for index, table in enumerate(tables)]
     if len(tables) > 1:
         decide = _deciding(tables, names)
         return [p for p in parts if p.recording not in decide], [parts[at] for at in decide]
@@ -120,12 +147,12 @@ def _changes(table: Columns, names: Sequence[str]) -> FloatArray:
 
 
 def _deciding(tables: Sequence[Columns], names: Sequence[str]) -> list[int]:
-    """Recordings to hold out, one in four of many: those whose excitation exceeds least.
+    """Recordings to hold out, about one in four: those whose excitation exceeds least.
 
     Of equals, logs of a series of settings, neighbours are alike: the choice is spread over them.
     """
     excess = [_excess(tables, names, index) for index in range(len(tables))]
-    count = max(len(tables) // ONE_IN, 1)
+    count = max((len(tables) + ONE_IN // 2) // ONE_IN, 1)
     limit = sorted(excess)[count - 1]
     certain = [index for index, own in enumerate(excess) if own < limit]
     equal = [index for index, own in enumerate(excess) if own == limit]

@@ -32,14 +32,14 @@ def explaining_training(base: Fitted, best: Ranked, rows: Sequence[Ranked]) -> t
     and one of them happens to matter in the recordings held out.
     """
     assert best.fitted is not None
-    least = CONTRADICTED * max(base.train_error**2 - best.fitted.train_error**2, 0.0)
+    least = CONTRADICTED * max(_explained(base, best.fitted), 0.0)
     return tuple(
         row.label
         for row in rows
         if row is not best
         and row.fitted is not None
         and row.held_out_error < base.held_out_error
-        and base.train_error**2 - row.fitted.train_error**2 > least
+        and _explained(base, row.fitted) > least
     )
 
 
@@ -89,19 +89,24 @@ def favoured_by_training(
         floor.left_over(*side)
         for side in ((base.held_out, after.held_out), (base.train, after.train))
     )
-    gain = max(base.train_error**2 - after.train_error**2, 0.0)
+    gain = max(_explained(base, after), 0.0)
 
     def favoured(row: Ranked) -> bool:
         fitted = row.fitted
         if fitted is None or fitted.train_error > (1 - MATERIAL) * base.train_error:
             return False
-        more = base.train_error**2 - fitted.train_error**2
+        more = _explained(base, fitted)
         if row.accepted and train > HALF and more > gain:
             return True
         much = min(held_out, train) >= LITTLE and more > FAVOURED * gain
         return much and difference(after.held_out, fitted.held_out).p_rises >= REFUTED
 
     return tuple(row.label for row in rows if _is_another(best, row) and favoured(row))
+
+
+def _explained(base: Fitted, fitted: Fitted) -> float:
+    """Training energy per sample that a fit with an effect explains; negative if it leaves more."""
+    return base.train_error**2 - fitted.train_error**2
 
 
 def _is_another(best: Ranked, row: Ranked) -> bool:

@@ -18,7 +18,7 @@ from rigwatch.workbench.explain.verdict_calibration import (
     probability_wrong_along,
 )
 from rigwatch.workbench.fit import Value, as_written, values
-from rigwatch.workbench.ranking import Ranked
+from rigwatch.workbench.ranking import Ranked, vanishing_shape
 
 STRENGTH_TOLD = ("missing_effect", "undetermined")
 """Verdicts of whose best effect the strength has its full uncertainty; fitting it takes time."""
@@ -100,8 +100,10 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
     members, rivals = [*verdict.members, *verdict.rivals], list(verdict.rivals)
     experiment = None
     # Excitations are compared by simulating the motion; a model along the measured motion cannot.
-    if verdict.best is not None and rivals and not bench.data.along_motion:
-        experiment = propose(bench, verdict.best, [row for row in rows if row.label in rivals])
+    # A rival of a set may have no row of its own among the single effects.
+    others = [row for row in rows if row.label in rivals]
+    if verdict.best is not None and others and not bench.data.along_motion:
+        experiment = propose(bench, verdict.best, others)
     more: dict[str, float] = {}
     compared = comparison(bench)
     named = verdict.word in STRENGTH_TOLD
@@ -169,7 +171,8 @@ def _row(row: Ranked, alike: list[str], more: Mapping[str, float] | None = None)
     found: dict[str, Value] = {}
     if row.fitted is not None:
         prefix = row.placement.prefix
-        every = as_written(values(row.fitted.train, more), row.fitted.compiled.system)
+        every = _with_open_strength(row, values(row.fitted.train, more))
+        every = as_written(every, row.fitted.compiled.system)
         found = {n[len(prefix) :]: v for n, v in every.items() if n.startswith(prefix)}
     others = [label for label in alike if label != row.label]
     return Row(
@@ -183,6 +186,21 @@ def _row(row: Ranked, alike: list[str], more: Mapping[str, float] | None = None)
         row.accepted,
         row.reason,
     )
+
+
+def _with_open_strength(row: Ranked, found: dict[str, Value]) -> dict[str, Value]:
+    """The values, with a note at the strength of an accepted effect if its shape leaves that open.
+
+    The slip force of a contact that hardly slips is such: its stiffness is determined.
+    """
+    effect, prefix = row.placement.effect, row.placement.prefix
+    name, neutral = prefix + effect.strength, effect.parameters[effect.strength].neutral
+    interval = found[name].interval if name in found else None
+    if not row.accepted or interval is None or not interval[0] <= neutral <= interval[1]:
+        return found
+    shape = [other for other in vanishing_shape(effect) if found[prefix + other].interval]
+    note = f"determined only together with {', '.join(shape)}" if shape else found[name].note
+    return found | {name: replace(found[name], note=note)}
 
 
 def as_data(found: Explanation) -> dict[str, object]:

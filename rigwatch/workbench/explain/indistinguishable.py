@@ -20,6 +20,8 @@ An effect may be named for its parameters and be behind.
 """
 NO_DIFFERENCE = 1e-4
 """Relative difference of errors that reflects only where two fits stopped."""
+A_TRACE = 0.01
+"""Relative difference of errors that does not tell which signal of a machine is late."""
 PERHAPS = 1.0
 """Standard deviations by which an effect with more parameters must be ahead to be a rival."""
 NEARLY = 0.8
@@ -87,16 +89,21 @@ def _in_class(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> boo
 def _same_shift(best: Ranked, row: Ranked) -> bool:
     """Whether both shift the machine's only input or only output in time, with the same result.
 
-    A time-invariant machine responds to a delayed input with the same motion, delayed.
+    A time-invariant machine responds to a delayed input with the same motion, delayed. So it does
+    if its other inputs hardly change, as the temperature of a room: both effects are parallel then,
+    and which leaves a trace less is decided by what else is not exact.
     """
     shifts = best.placement.effect.time_shift and row.placement.effect.time_shift
     if not shifts or best.fitted is None or row.port == best.port:
         return False
     model = best.fitted.compiled.system.model
     computed = {name for name, port in model.ports.items() if port.signal in model.quantities}
-    if computed & {best.port, row.port}:
+    if computed & {best.port, row.port} or len(model.outputs) > 1:
         return False
-    return len(model.driving()) == len(model.outputs) == 1 and best.cosines[row.label] > SIMILAR
+    cosine = best.cosines.get(row.label, 0.0)
+    if len(model.driving()) == 1:
+        return cosine > SIMILAR
+    return cosine > SAME and row.held_out_error < (1 + A_TRACE) * best.held_out_error
 
 
 def _rivals(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:

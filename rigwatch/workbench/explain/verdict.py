@@ -118,30 +118,42 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
         floor.left_over(base.held_out, best.fitted.held_out), _margin(best, rows, members + rivals)
     )
     word, text = _word(base, best, rivals, floor)
-    elsewhere = () if trusted else explaining_training(base, best, rows)
-    if word == "missing_effect" and elsewhere:
-        word, rivals = "undetermined", elsewhere
-        text = (
-            f"{best.label} lowers the held-out error most, but {', '.join(elsewhere)} explains more"
-            f" than {CONTRADICTED:g} times as much of the training error"
-        )
-    elif word == "missing_effect" and (better := explaining_all(base, best, rows, floor)):
-        word, rivals = "undetermined", better
-        text = (
-            f"{best.label} lowers the held-out error most, but {', '.join(better)} explains more of"
-            " all recordings together"
-        )
-    elif word == "missing_effect" and hardly_trains(base, best, floor):
-        word = "unknown_effect"
-        text = f"the best known effect, {best.label}, leaves nearly all of the training error"
-    elif word == "missing_effect" and (others := favoured_by_training(base, best, rows, floor)):
-        word, rivals = "undetermined", others
-        text = (
-            f"{best.label} lowers the held-out error most, but {', '.join(others)} explains more of"
-            f" the training error, much of which {best.label} leaves"
-        )
+    ahead = None if trusted else _passed_over(best, accepted)
+    if word == "missing_effect" and (doubt := _doubt(base, best, ahead, rows, floor)):
+        word, rivals, text = doubt
+    if word == "undetermined" and ahead is not None and ahead.label not in (*members, *rivals):
+        rivals = (*rivals, ahead.label)
     text += remaining_error(base, best, floor) + other_accepted(rows, (*members, *rivals))
     return Verdict(word, best, members, rivals, text, evidence=evidence)
+
+
+def _doubt(
+    base: Fitted, best: Ranked, ahead: Ranked | None, rows: Sequence[Ranked], floor: NoiseFloor
+) -> tuple[Word, tuple[str, ...], str] | None:
+    """Verdict, rivals and sentence if other recordings speak for other effects; otherwise None.
+
+    Args:
+        base, best, rows, floor: the model, the effect named, the ranking and the noise floor.
+        ahead: the effect that was passed over for its parameters.
+    """
+    assert best.fitted is not None
+    leads = f"{best.label} lowers the held-out error most"
+    if ahead is not None:
+        leads += f" of those as simple ({ahead.label} lowers it further)"
+    trusted = floor.reached(best.fitted.held_out)
+    if not trusted and (elsewhere := explaining_training(base, best, rows)):
+        much = f"more than {CONTRADICTED:g} times as much of the training error"
+        return "undetermined", elsewhere, f"{leads}, but {', '.join(elsewhere)} explains {much}"
+    if better := explaining_all(base, best, rows, floor):
+        more = "more of all recordings together"
+        return "undetermined", better, f"{leads}, but {', '.join(better)} explains {more}"
+    if hardly_trains(base, best, floor):
+        text = f"the best known effect, {best.label}, leaves nearly all of the training error"
+        return "unknown_effect", (), text
+    if others := favoured_by_training(base, best, rows, floor):
+        more = f"more of the training error, much of which {best.label} leaves"
+        return "undetermined", others, f"{leads}, but {', '.join(others)} explains {more}"
+    return None
 
 
 def _refuse_what_hardly_trains(base: Fitted, rows: Sequence[Ranked]) -> None:
@@ -228,6 +240,22 @@ def _named(base: Fitted, accepted: Sequence[Ranked], floor: NoiseFloor) -> Ranke
             alone = explains(base, best, floor) and not explains(base, row, floor)
             return best if alone else row
     return best if explains(base, best, floor) else _simpler_of_all(best, accepted)
+
+
+def _passed_over(best: Ranked, accepted: Sequence[Ranked]) -> Ranked | None:
+    """The effect of other physics that leads but has more parameters than the one named; or None.
+
+    It leaves materially less of what is held out and less of all recordings. While more is missing
+    that is no reason to name it, but where rivals are told it is one.
+    """
+    top = min(accepted, key=lambda row: row.held_out_error)
+    same_physics = same_family(best, top) or top.placement.effect.refines == best.effect
+    if top.free <= best.free or same_physics:
+        return None
+    assert best.fitted is not None
+    assert top.fitted is not None
+    ahead = top.held_out_error < (1 - MATERIAL) * best.held_out_error
+    return top if ahead and energy_of_all(top.fitted) < energy_of_all(best.fitted) else None
 
 
 def _simpler_of_all(best: Ranked, accepted: Sequence[Ranked]) -> Ranked:

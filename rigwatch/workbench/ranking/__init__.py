@@ -5,7 +5,14 @@ are fitted (`refitting`) and judged by the held-out error (`acceptance`). `rank`
 `with_refinements` adds effects that describe the best one in more detail.
 """
 
-from rigwatch.workbench.ranking.acceptance import EXPLAINED, MATERIAL, STEP, judge_fit, left_over
+from rigwatch.workbench.ranking.acceptance import (
+    EXPLAINED,
+    MATERIAL,
+    STEP,
+    judge_fit,
+    left_over,
+    vanishing_shape,
+)
 from rigwatch.workbench.ranking.candidates import candidates, shapes_of, suitable
 from rigwatch.workbench.ranking.fit_selection import select_for_fit
 from rigwatch.workbench.ranking.nested_start import refit_nested
@@ -57,5 +64,6 @@ __all__ = [
     "select_for_fit",
     "shapes_of",
     "suitable",
+    "vanishing_shape",
     "with_refinements",
 ]

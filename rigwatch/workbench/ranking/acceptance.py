@@ -62,7 +62,7 @@ def _undetermined_strength(row: Ranked) -> str | None:
     assert row.fitted is not None
     effect, prefix = row.placement.effect, row.placement.prefix
     name = effect.strength
-    shape = [prefix + other for other in _vanishing_shape(effect)]
+    shape = [prefix + other for other in vanishing_shape(effect)]
     interval = interval_with_held(row.fitted.train, prefix + name, shape)
     p = effect.parameters[name]
     if p.role == "switch" or interval is None or not interval[0] <= p.neutral <= interval[1]:
@@ -73,7 +73,7 @@ def _undetermined_strength(row: Ranked) -> str | None:
     )
 
 
-def _vanishing_shape(effect: Effect) -> list[str]:
+def vanishing_shape(effect: Effect) -> list[str]:
     """Parameters that vanish from the expression when the strength is neutral."""
     neutral = effect.parameters[effect.strength].neutral
     left = {effect.strength, *_names_at_neutral(effect.expression, effect.strength, neutral)}

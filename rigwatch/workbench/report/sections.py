@@ -12,7 +12,7 @@ from rigwatch.workbench.compare import Region
 from rigwatch.workbench.explain import Explanation
 from rigwatch.workbench.fit import Value
 from rigwatch.workbench.report import charts
-from rigwatch.workbench.report.text_report import VERDICTS, doubt_of
+from rigwatch.workbench.report.text_report import VERDICTS, doubt_of, more_missing
 from rigwatch.workbench.steps import Signals, Stage
 from rigwatch.workbench.study import Study
 
@@ -63,11 +63,10 @@ def headline(m: Material) -> str:
     best = m.explanation.ranking[0] if m.explanation.ranking else None
     name = f"{_plain(best.effect)} at {best.port}" if best else ""
     rivals = " or ".join(_plain(rival.split("@")[0]) for rival in m.explanation.rivals)
-    more = ", and more than that" if m.explanation.remains else ""
     undecided = f"{name} from {rivals}" if rivals else f"whether {name or 'anything'} is missing"
     words = {
         "nothing_missing": "nothing is missing",
-        "missing_effect": f"probably missing: {name}{more}",
+        "missing_effect": f"probably missing: {name}{more_missing(m.explanation)}",
         "undetermined": f"this recording cannot tell {undecided}",
     }.get(m.explanation.verdict, VERDICTS[m.explanation.verdict])
     if m.explanation.also:

@@ -138,10 +138,14 @@ def explanation_lines(found: Explanation) -> list[str]:
 
 def headline(found: Explanation) -> str:
     """The verdict in a few words, and how much more than the effect that it names is missing."""
-    title = VERDICTS[found.verdict]
+    return VERDICTS[found.verdict] + more_missing(found)
+
+
+def more_missing(found: Explanation) -> str:
+    """How much more than the effect that it names is missing, in words; empty if nothing is."""
     if found.verdict != "missing_effect" or not found.remains:
-        return title
-    return f"{title}, and more than that: it leaves {found.remains:.0%} of the error's energy"
+        return ""
+    return f", and more than that: it leaves {found.remains:.0%} of the error's energy"
 
 
 def _named_lines(found: Explanation) -> list[str]:
@@ -149,8 +153,12 @@ def _named_lines(found: Explanation) -> list[str]:
     if found.verdict != "missing_effect" or not found.ranking:
         return []
     best = found.ranking[0]
-    fitted = [f"{n} = {shown(v)}" for n, v in best.parameters.items() if v.interval is not None]
-    return [f"  {best.effect}@{best.port}: {', '.join(fitted)}"] if fitted else []
+    fitted = [
+        f"{name} = {shown(value)}{f', {value.note}' if value.note else ''}"
+        for name, value in best.parameters.items()
+        if value.interval is not None
+    ]
+    return [f"  {best.effect}@{best.port}: {'; '.join(fitted)}"] if fitted else []
 
 
 def next_command(found: Explanation, study: str) -> str:

@@ -71,7 +71,7 @@ def _file(files: NewFiles, logs: Logs, model: Model, reading: Matched) -> tuple[
     tables = [read_columns(files.folder, span) for span in spans]
     driving = [n for n in _channels(model.inputs) if n in tables[0].values]
     outputs = [n for n in _channels(model.outputs) if n in tables[0].values]
-    train, held_out = proposed_split(tables, driving or outputs)
+    train, held_out = proposed_split(tables, driving or outputs, outputs)
     lines = [f'model = "{_named(files, logs.model)}"']
     choices = [f"columns: {_as_read(columns)}"] if columns else []
     rates = [1 / table.dt for table in tables]

@@ -36,7 +36,12 @@ def _value(table: Table, name: str, told: str, model: Model) -> float:
     if name not in model.parameters:
         raise ModelError(f"{option}: found {name!r}{nearest(name, model.parameters)}")
     if number not in table.scalars:
-        hint = nearest(number, table.scalars) if table.scalars else ", and no other single number"
+        log = table.path.stem
+        hint = (
+            nearest(number, table.scalars)
+            if table.scalars
+            else f" beside its columns; give it with --set {log}:{name}=VALUE"
+        )
         raise ModelError(f"{option}: {table.path}: found no number {number!r}{hint}")
     unit = model.parameters[name].shown or model.parameters[name].unit
     wanted = unit_of(unit)

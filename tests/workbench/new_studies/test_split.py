@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from rigwatch.workbench.compare.compare import compare
 from rigwatch.workbench.data import proposed_split, unchanging
@@ -39,6 +40,34 @@ def test_a_log_in_which_nothing_changes_is_not_held_out() -> None:
     assert held_out.recording == 2
     assert unchanging(tables[1], ["u"], Part(1)) == ["u"]
     assert not unchanging(tables[0], ["u"], Part(0))
+
+
+def warmed(seed: int, noise: float) -> Columns:
+    """A block at rest for 200 s, then heated in two steps; its time constant is 300 s."""
+    u, warm = np.zeros(6000), np.zeros(6000)
+    u[200:], u[700:] = 1.0, 3.0
+    for k in range(1, len(u)):
+        warm[k] = warm[k - 1] + (u[k - 1] - warm[k - 1]) / 300
+    return Columns(1.0, {"u": u, "T": warm + noise * np.random.default_rng(seed).normal(size=6000)})
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05, 0.3])
+def test_a_log_ends_where_the_machine_rests_not_where_its_input_does(noise: float) -> None:
+    tables = [warmed(seed, noise) for seed in range(2)]
+    for part in (
+        *proposed_split(tables, ["u"], ["T"])[0],
+        *proposed_split(tables, ["u"], ["T"])[1],
+    ):
+        assert part.start == 0.0 or 100 < part.start < 200
+        assert 1000 < part.end < 3000
+
+
+@pytest.mark.parametrize(("logs", "held_out"), [(2, 1), (5, 1), (6, 2), (8, 2), (16, 4)])
+def test_of_six_logs_no_single_one_decides(logs: int, held_out: int) -> None:
+    waves = [np.sin(np.arange(1000) / 100 + phase) for phase in range(logs)]
+    train, decide = proposed_split([logged(wave) for wave in waves], ["u"])
+    assert len(decide) == held_out
+    assert len(train) == logs - held_out
 
 
 def test_an_input_that_never_changes_is_told(tmp_path: Path) -> None:

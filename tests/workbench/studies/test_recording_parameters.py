@@ -125,6 +125,9 @@ def test_logs_with_known_loads_become_a_study(tmp_path: Path, capsys) -> None:
     shutil.rmtree(folder)
     assert main([*begin, "--set", "ful:m=1"]) == 2
     assert "--set: found log 'ful'; did you mean 'full'?" in capsys.readouterr().err
+    assert main([*begin, "--set", "m=load"]) == 2
+    said = r"found no number 'load' beside its columns; give it with --set \w+:m=VALUE"
+    assert re.search(said, capsys.readouterr().err)
 
 
 def stating(folder: Path, factor: float = 1.0) -> list[str]:

@@ -10,8 +10,11 @@ from scipy.signal import lfilter
 
 from rigwatch.workbench.compare import open_bench
 from rigwatch.workbench.explain.explain import explain
+from rigwatch.workbench.explain.explanation import explanation
+from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.ranking import rank_only, refit, shapes_of
 from rigwatch.workbench.ranking.paired_test import difference
+from rigwatch.workbench.report import explanation_lines
 from rigwatch.workbench.steps.change import add
 from tests.workbench.dampers import damper, effect
 from tests.workbench.machine import studied
@@ -124,6 +127,34 @@ def test_a_strength_that_may_as_well_be_neutral_is_not_accepted(tmp_path: Path) 
     assert "the training does not determine its strength" in change.text
     assert change.tried is not None
     assert change.tried[1] < 0.5 * change.before.held_out_error
+
+
+SOFT = effect(
+    "soft",
+    "-A*tanh(x/w)",
+    A="unit = '{F}', role = 'strength'",
+    w="unit = '{x}', value = 0.1, low = 0.001, high = 2.0",
+)
+
+
+@pytest.mark.parametrize(
+    ("size", "width", "note"), [(20.0, 0.2, "determined only together with w"), (3.0, 0.006, "")]
+)
+def test_a_strength_that_only_its_shape_leaves_open_is_told_so(
+    tmp_path: Path, size: float, width: float, note: str
+) -> None:
+    bench = open_bench(damper(tmp_path, lambda x, v: size * np.tanh(x / width), SOFT))
+    shapes = shapes_of(bench.study, bench.data.train, "soft", "load")
+    row = rank_only(bench.study, bench.data, bench.base, shapes)
+    refit(bench.study, bench.data, bench.base, row)
+    assert row.accepted
+    verdict = Verdict("missing_effect", row, (row.label,), (), "")
+    found = explanation(bench, [row], verdict)
+    strength = found.ranking[0].parameters["A"]
+    assert strength.interval is not None
+    assert (strength.interval[0] <= 0 <= strength.interval[1]) == bool(note)
+    assert strength.note == note
+    assert (f", {note};" in explanation_lines(found)[3]) == bool(note)
 
 
 def test_what_helps_a_little_is_not_called_the_answer(tmp_path: Path) -> None:

@@ -578,6 +578,29 @@ def test_a_late_input_is_a_late_output_where_there_is_one_of_each(
     assert ("delay@drive" in found.members) is not told_apart
 
 
+@pytest.mark.parametrize(
+    ("cosine", "error", "told_apart"),
+    [
+        pytest.param(0.9999, 1.005, False, id="a trace less"),
+        pytest.param(0.99, 1.005, True, id="the other input moves"),
+        pytest.param(0.9999, 1.05, True, id="clearly less"),
+    ],
+)
+def test_beside_an_input_that_hardly_moves_a_late_input_is_a_late_output(
+    cosine: float, error: float, *, told_apart: bool
+) -> None:
+    sensor = best("delay@sensor", kind="sensor", shift=True, cosines={"delay@drive": cosine})
+    drive = row(
+        "delay@drive", error, kind="actuator", shift=True, jitter=0.0,
+        cosines={"delay@sensor": cosine},
+    )  # fmt: skip
+    assert sensor.fitted is not None
+    sensor.fitted.compiled.system.model.driving = lambda: ("power", "room")
+    found = judge(base(), [sensor, drive], PERIODS)
+    assert found.word == "missing_effect"
+    assert ("delay@drive" in found.members) is not told_apart
+
+
 def test_where_training_and_held_out_disagree_nothing_is_named_alone() -> None:
     best, other = row("valve_hysteresis@drive", 2.0), row("stribeck@shaft", 2.8, accepted=False)
     _with_training_error(best, 2.6)
@@ -586,6 +609,28 @@ def test_where_training_and_held_out_disagree_nothing_is_named_alone() -> None:
     assert (found.word, found.rivals) == ("undetermined", ("stribeck@shaft",))
     _with_training_error(other, 2.6)
     assert judge(base(), [best, other], QUIET).word == "missing_effect"
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        pytest.param({}, True, id="of other physics"),
+        pytest.param({"refines": "sag"}, False, id="a refinement"),
+        pytest.param({"family": "drive"}, False, id="of one family"),
+        pytest.param({"free": 1}, False, id="as simple"),
+    ],
+)
+def test_what_leads_with_more_parameters_is_a_rival_where_rivals_are_told(
+    more: dict[str, Any], told: bool
+) -> None:
+    # An error that differs from block to block leaves the two equal held out.
+    simple = trained(row("sag@drive", 2.0, jitter=3.0, family="drive"), 2.6)
+    leader = trained(row("limit@drive", 1.9, jitter=-3.0, **{"free": 2, **more}), 2.5)
+    other = trained(row("rate@drive", 2.8, accepted=False), 1.5)
+    found = judge(base(), [simple, leader, other], QUIET)
+    assert found.word == "undetermined"
+    assert ("limit@drive" in found.rivals) == told
+    assert ("of those as simple (limit@drive lowers it further)" in found.text) == told
 
 
 def _with_training_error(of: Ranked, error: float) -> None:
