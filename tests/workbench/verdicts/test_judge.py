@@ -13,7 +13,12 @@ from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.explain.indistinguishable import undistinguished
 from rigwatch.workbench.explain.remaining_error import remaining_share
-from rigwatch.workbench.explain.sets.several_effects import with_similar
+from rigwatch.workbench.explain.sets.combinations import Combination
+from rigwatch.workbench.explain.sets.several_effects import (
+    _Member,
+    _with_alternatives,
+    with_similar,
+)
 from rigwatch.workbench.explain.verdict import Verdict, judge, not_converged
 from rigwatch.workbench.explain.verdict_calibration import CLEAR, probability_wrong
 from rigwatch.workbench.fit import Fitted
@@ -656,6 +661,21 @@ def test_what_a_set_bends_into_a_similar_law_is_not_named_alone(
     found = with_similar(named, rows)
     assert found.word == word
     assert found.rivals == ((label,) if word == "undetermined" else ())
+
+
+@pytest.mark.parametrize("instead", ["radiation@x", "convection@x"])
+def test_an_effect_that_equally_good_sets_replace_is_not_said_to_be_missing(instead: str) -> None:
+    convection, delay = best("convection@x"), row("delay@x", 1.2)
+    named = Verdict("missing_effect", convection, ("convection@x",), (), "convection@x is missing")
+    other = Combination((row(instead, 1.0), delay))
+    found = _with_alternatives(
+        _Member(convection, named), Combination((convection, delay)), [other]
+    ).verdict
+    if instead == "convection@x":
+        assert found is named
+    else:
+        assert (found.word, found.rivals) == ("undetermined", (instead,))
+        assert found.text == "convection@x and radiation@x explain it equally well"
 
 
 # ---- the model's own error --------------------------------------------------------------------

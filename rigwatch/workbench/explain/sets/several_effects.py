@@ -250,8 +250,10 @@ def _with_alternatives(part: _Member, best: Combination, others: Sequence[Combin
     instead = sorted(frozenset().union(*(each.labels - best.labels for each in without_it)))
     if part.verdict.best is None or not instead:
         return part
-    rivals = (*part.verdict.rivals, *instead)
-    return replace(part, verdict=replace(part.verdict, word="undetermined", rivals=rivals))
+    rivals = tuple(dict.fromkeys((*part.verdict.rivals, *instead)))
+    text = f"{part.verdict.best.label} and {', '.join(rivals)} explain it equally well"
+    undetermined = replace(part.verdict, word="undetermined", rivals=rivals, text=text)
+    return replace(part, verdict=undetermined)
 
 
 def _set_verdict(
