@@ -2,7 +2,8 @@
 
 Commissioning gets the chirp and the recordings `healthy_*` and `friction_*` with the generator
 locked. Hard excitations (`hard_*`) are counted separately. Where the truth states a constant dry
-friction, the force that the name comes with is compared with it.
+friction, the force that the name comes with is compared with it; no recording shows the moving
+mass, so that the force is off by as much as the mass in the model.
 """
 
 import statistics
