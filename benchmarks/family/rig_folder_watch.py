@@ -1,12 +1,14 @@
 """The monitor on a folder of recordings: quiet on healthy ones, friction named, faults noticed.
 
 Commissioning gets the chirp and the recordings `healthy_*` and `friction_*` with the generator
-locked. Hard excitations (`hard_*`) are counted separately.
+locked. Hard excitations (`hard_*`) are counted separately. Where the truth states a constant dry
+friction, the force that the name comes with is compared with it; no recording shows the moving
+mass, so that the force is off by as much as the mass in the model.
 """
 
 import statistics
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from benchmarks.family.rig_folder import RigFolder, Tally, answer
 
@@ -15,6 +17,16 @@ ALARM = ("departure", "other_fault", *FRICTION)
 EARLY_S = 0.02
 """Largest time of an alarm before its fault that sampling and rounding can cause."""
 RATE = 256.0
+CLOSE = 0.2
+"""Largest relative error of a force that is close to the truth."""
+
+
+class Raised(NamedTuple):
+    """An alarm: its name, when it was raised [s], and its value, a force [N] if dry friction."""
+
+    name: str
+    time: float
+    value: float
 
 
 @dataclass
@@ -22,8 +34,10 @@ class Watched:
     """The monitor's results for a folder.
 
     Attributes:
-        tally: quiet, noticed, named, other faults; `hard ...` for the hard excitations.
+        tally: quiet, noticed, named, force close to the truth, other faults; `hard ...` for the
+            hard excitations.
         to_alarm, to_name: latencies after friction begins [ms], without hard ones.
+        force_errors: relative errors of the force that friction is named with, without hard ones.
         miscalled: other faults named friction.
         lines: one for each recording.
     """
@@ -31,6 +45,7 @@ class Watched:
     tally: Tally = field(default_factory=Tally)
     to_alarm: list[float] = field(default_factory=list)
     to_name: list[float] = field(default_factory=list)
+    force_errors: list[float] = field(default_factory=list)
     miscalled: int = 0
     lines: list[str] = field(default_factory=list)
 
@@ -38,12 +53,13 @@ class Watched:
         """One line."""
         return (
             f"{self.tally}, called friction wrongly {self.miscalled}, "
-            f"median ms to alarm {_median(self.to_alarm)}, to name {_median(self.to_name)}"
+            f"median ms to alarm {_median(self.to_alarm)}, to name {_median(self.to_name)}, "
+            f"median error of the force {_median([100 * abs(e) for e in self.force_errors])} %"
         )
 
 
-def _median(times: list[float]) -> str:
-    return f"{statistics.median(times):.0f}" if times else "-"
+def _median(figures: list[float]) -> str:
+    return f"{statistics.median(figures):.0f}" if figures else "-"
 
 
 def watched(rig: RigFolder) -> Watched:
@@ -62,26 +78,30 @@ def watched(rig: RigFolder) -> Watched:
     return found
 
 
-def _alarms(rig: RigFolder, name: str) -> tuple[list[tuple[str, float]], str]:
-    """Names and times [s] of the alarms that a replay raises."""
+def _alarms(rig: RigFolder, name: str) -> tuple[list[Raised], str]:
+    """The alarms that a replay raises, and its failure in words."""
     model = rig.work / "model.toml"
     said, failed = answer("replay", rig.session("watch", name), "--model", model)
-    alarms = [(alarm["name"], alarm["seq"] / RATE) for alarm in said.get("alarms", [])]
-    return [alarm for alarm in alarms if alarm[0] in ALARM], failed
+    alarms = [
+        Raised(alarm["name"], alarm["seq"] / RATE, alarm["value"])
+        for alarm in said.get("alarms", [])
+        if alarm["name"] in ALARM
+    ]
+    return alarms, failed
 
 
 def _judge(
-    found: Watched, name: str, told: dict[str, Any], alarms: list[tuple[str, float]], failed: str
+    found: Watched, name: str, told: dict[str, Any], alarms: list[Raised], failed: str
 ) -> None:
     onset = float(told.get("from_s", float("inf")))
-    before = [alarm for alarm in alarms if alarm[1] < onset - EARLY_S and onset > 0]
-    after = [alarm for alarm in alarms if alarm[1] >= onset - EARLY_S]
-    named = [alarm for alarm in after if alarm[0] in FRICTION]
+    before = [alarm for alarm in alarms if alarm.time < onset - EARLY_S and onset > 0]
+    after = [alarm for alarm in alarms if alarm.time >= onset - EARLY_S]
+    named = [alarm for alarm in after if alarm.name in FRICTION]
     hard = "hard " if name.startswith("hard_") else ""
     what = told["what"]
     quiet = not before and not failed
     if what == "other fault":
-        called = any(alarm[0] in FRICTION for alarm in alarms)
+        called = any(alarm.name in FRICTION for alarm in alarms)
         found.miscalled += called
         right = bool(after) and not called
         found.tally.count("other faults", right)
@@ -93,7 +113,18 @@ def _judge(
         found.tally.count(f"{hard}named", bool(named))
         right = quiet and bool(named)
         if not hard:
-            found.to_alarm += [1e3 * (after[0][1] - onset)] if after else []
-            found.to_name += [1e3 * (named[0][1] - onset)] if named else []
-    said = failed or " ".join(f"{alarm}@{time:.2f}" for alarm, time in alarms[:6])
+            found.to_alarm += [1e3 * (after[0].time - onset)] if after else []
+            found.to_name += [1e3 * (named[0].time - onset)] if named else []
+            _compare_force(found, told, named)
+    said = failed or " ".join(f"{alarm.name}@{alarm.time:.2f}" for alarm in alarms[:6])
     found.lines.append(f"{'ok ' if right else 'BAD'} {name:28s} {what[:30]:30s} {said}")
+
+
+def _compare_force(found: Watched, told: dict[str, Any], named: list[Raised]) -> None:
+    """Counts whether the first `dry_friction` has a force close to the truth, if that is stated."""
+    true = told.get("hidden", {}).get("dry")
+    given = [alarm.value for alarm in named if alarm.name == "dry_friction"]
+    if true and given:
+        error = given[0] / true - 1.0
+        found.force_errors.append(error)
+        found.tally.count("force close", abs(error) <= CLOSE)
