@@ -77,6 +77,7 @@ from monitor.observer.missing_force import LATE_UNIT, MOVED, UNSURE_INPUT, E
 from monitor.observer.window_statistics import (
     drive_explains,
     dry_force,
+    force_since_onset,
     friction,
     lasting_energy,
     mean_square,
@@ -413,7 +414,7 @@ def _verdict(
     agrees = since >= LEAST_LOOK and ((fits and turned) or sticks)
     count[AGREED] = count[AGREED] + 1 if agrees and count[DISAGREED] == 0 else 0
     if fits:
-        kept.value[1] = force
+        kept.value[1] = force_since_onset(kept, since, length)
     if count[AGREED] >= LOOKS or before in (FRICTION, STICKING):
         return STICKING if still > STUCK or before == STICKING else FRICTION
     return OTHER if since > rules.patience else UNNAMED

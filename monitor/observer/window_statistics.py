@@ -124,6 +124,31 @@ def dry_force(kept: DecisionState, length: int) -> float:
 
 
 @njit()
+def force_since_onset(kept: DecisionState, shortest: int, longest: int) -> float:
+    """Force of dry friction alone over the part of the window in which it acts [N].
+
+    Friction is noticed a little after it begins. Of the windows that end now, that is used in
+    which it explains most energy (a change point by maximum likelihood): samples from before its
+    onset would make it appear smaller.
+
+    Args:
+        kept: the window's sums are of its rows.
+        shortest: length in which friction surely acts [samples].
+        longest: length that may begin before it [samples].
+    """
+    n = min(longest, kept.counts[FILLED])
+    a = p = most = found = 0.0
+    for ago in range(1, n + 1):
+        if _slides(kept, ago):
+            row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
+            a += row[DRY] * row[DRY]
+            p += row[DRY] * row[ERROR]
+        if ago >= min(shortest, n) and a > 0.0 and p * abs(p) > most * a:
+            most, found = p * p / a, p / a
+    return found
+
+
+@njit()
 def drive_explains(kept: DecisionState, length: int, spread: float) -> float:
     """Share of the residual beyond its healthy variance that a weaker drive explains.
 
