@@ -193,7 +193,7 @@ def _memory_row(what: str, done: Year, name: str) -> Row:
         "",
         f"{growth:+.2f} % over {looks} sessions, {late:+.2f} % over the last {late_looks}, "
         f"{at_end:.1f} MB at the end",
-        passed=bool(year_percent <= MEMORY_PERCENT),
+        passed=year_percent <= MEMORY_PERCENT,
     )
 
 

@@ -50,7 +50,7 @@ class Memory:
         if len(late) < 4:
             return float("nan"), late[-1] / 1e3 if late else float("nan"), len(late)
         slope, level = np.polyfit(np.arange(len(late)), late, 1)
-        return 100.0 * slope * len(late) / level, late[-1] / 1e3, len(late)
+        return float(100.0 * slope * len(late) / level), late[-1] / 1e3, len(late)
 
 
 def _of_last(looks: Iterable[tuple[int, float]]) -> list[float]:

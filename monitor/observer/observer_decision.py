@@ -77,7 +77,6 @@ from monitor.observer.missing_force import LATE_UNIT, MOVED, UNSURE_INPUT, E
 from monitor.observer.window_statistics import (
     drive_explains,
     dry_force,
-    force_since_onset,
     friction,
     lasting_energy,
     mean_square,
@@ -402,7 +401,7 @@ def _verdict(
     since = count[ONSET]
     length = min(since + SHORT, LONG)
     beside, _, _, share, dry = friction(kept, length, spread)
-    force = dry_force(kept, length)
+    force, acting = dry_force(kept, since, length)
     out[SHARE, k], out[DRY_SHARE, k] = share, dry
     least = LEFT_EARLY if length < MEDIUM else LEFT
     fits = share > FITS and dry > DRY_PART and force > 0.0 and beside > least * force
@@ -414,7 +413,7 @@ def _verdict(
     agrees = since >= LEAST_LOOK and ((fits and turned) or sticks)
     count[AGREED] = count[AGREED] + 1 if agrees and count[DISAGREED] == 0 else 0
     if fits:
-        kept.value[1] = force_since_onset(kept, since, length)
+        kept.value[1] = acting
     if count[AGREED] >= LOOKS or before in (FRICTION, STICKING):
         return STICKING if still > STUCK or before == STICKING else FRICTION
     return OTHER if since > rules.patience else UNNAMED

@@ -106,46 +106,29 @@ def friction(
 
 
 @njit()
-def dry_force(kept: DecisionState, length: int) -> float:
-    """Force of dry friction alone [N].
+def dry_force(kept: DecisionState, surely: int, length: int) -> tuple[float, float]:
+    """Force of dry friction alone [N], over a window and over the part of it in which it acts.
 
     A steady motion hardly distinguishes viscous friction from it, and a joint fit would assign to
-    viscous friction what smoothing and presliding round off.
-    """
-    n = min(length, kept.counts[FILLED])
-    a = p = 0.0
-    for ago in range(1, n + 1):
-        if not _slides(kept, ago):
-            continue
-        row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
-        a += row[DRY] * row[DRY]
-        p += row[DRY] * row[ERROR]
-    return p / a if a > 0.0 else 0.0
-
-
-@njit()
-def force_since_onset(kept: DecisionState, shortest: int, longest: int) -> float:
-    """Force of dry friction alone over the part of the window in which it acts [N].
-
-    Friction is noticed a little after it begins. Of the windows that end now, that is used in
-    which it explains most energy (a change point by maximum likelihood): samples from before its
-    onset would make it appear smaller.
+    viscous friction what smoothing and presliding round off. Friction is noticed a little after it
+    begins: of the windows that end now, the second force is of that in which it explains most
+    energy (a change point by maximum likelihood). Samples from before would make it appear smaller.
 
     Args:
-        kept: the window's sums are of its rows.
-        shortest: length in which friction surely acts [samples].
-        longest: length that may begin before it [samples].
+        kept: the window's rows.
+        surely: newest samples in which friction acts, if it does.
+        length: of the window [samples].
     """
-    n = min(longest, kept.counts[FILLED])
-    a = p = most = found = 0.0
+    n = min(length, kept.counts[FILLED])
+    a = p = most = acting = 0.0
     for ago in range(1, n + 1):
         if _slides(kept, ago):
             row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
             a += row[DRY] * row[DRY]
             p += row[DRY] * row[ERROR]
-        if ago >= min(shortest, n) and a > 0.0 and p * abs(p) > most * a:
-            most, found = p * p / a, p / a
-    return found
+        if ago >= min(surely, n) and a > 0.0 and p * abs(p) > most * a:
+            most, acting = p * p / a, p / a
+    return p / a if a > 0.0 else 0.0, acting
 
 
 @njit()

@@ -114,8 +114,7 @@ class Narrator:
             self._say(f"{self._time(alarm.seq)} ALARM: {alarm.cause}{self._delay(alarm)}")
             if alarm.name not in OF_THE_RIG:
                 self._say("            (about the measuring chain: none of the faults announced)")
-            guidance = alarm.guidance.replace("CONFIG", self._config)
-            self._say(f"            what to do: {guidance}")
+            self._say(f"            what to do: {alarm.guidance_for(self._config)}")
             if alarm.name != NAMELESS:
                 self._say(f"            all alarms: $ rigwatch alarms {self._config}")
         elif alarm.name in {told.name for told in self.alarms} and alarm.state in ENDED:

@@ -22,7 +22,7 @@ def test_force_does_not_fall_with_samples_in_which_friction_turns(late: int) -> 
     force, viscous, _, share, _ = friction(kept, LENGTH, 1e-3)
 
     assert force == pytest.approx(FORCE, rel=1e-6)
-    assert dry_force(kept, LENGTH) == pytest.approx(FORCE, rel=1e-6)
+    assert dry_force(kept, LENGTH, LENGTH)[0] == pytest.approx(FORCE, rel=1e-6)
     assert viscous == pytest.approx(0.0, abs=1e-6)
     assert share == pytest.approx(1.0, abs=1e-3)
 

@@ -76,5 +76,4 @@ def as_line(alarm: "Alarm") -> str:
 
 def as_text(alarm: "Alarm", config: Path) -> str:
     """The alarm with its cause, and its guidance with the rig's file in the commands."""
-    guidance = alarm.guidance.replace("CONFIG", str(config))
-    return f"{as_line(alarm)}\n    {alarm.cause}\n    {guidance}"
+    return f"{as_line(alarm)}\n    {alarm.cause}\n    {alarm.guidance_for(str(config))}"

@@ -263,6 +263,10 @@ class Alarm:
     onset_seq: int
     identity: Identity = ""
 
+    def guidance_for(self, config: str) -> str:
+        """The recommended action, its commands with the rig's configuration file."""
+        return self.guidance.replace("CONFIG", config)
+
 
 @dataclass(frozen=True, slots=True)
 class AlarmCommand:
