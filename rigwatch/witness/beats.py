@@ -9,7 +9,7 @@ from pathlib import Path
 from rigwatch.wire.errors import ConfigError, reason_of
 from rigwatch.wire.host import replace_file
 from rigwatch.witness.bounded import Bounded
-from rigwatch.witness.cut_request import CutRequest
+from rigwatch.witness.http_ping import why_not
 
 TIMEOUT = 5.0
 """Longest wait for each part of the answer to a ping [s]."""
@@ -76,9 +76,9 @@ class Pinger:
 
     def _ping(self) -> str:
         """Ping; returns why it failed, "" if it did not."""
-        found, request = ["no answer"], CutRequest(self._url, TIMEOUT)
+        found = ["no answer"]
         try:
-            self._bounded.call(lambda: found.append(request.ask()), WHOLE, request.cut)
+            self._bounded.call(lambda: found.append(why_not(self._url, TIMEOUT)), WHOLE)
         except TimeoutError as error:
             return str(error)
         return found[-1]

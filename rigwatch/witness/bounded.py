@@ -3,6 +3,8 @@
 import threading
 from collections.abc import Callable
 
+from rigwatch.witness.connections import Connections
+
 MOST_HUNG = 4
 """Calls that may hang at the same time; further ones fail at once."""
 
@@ -10,8 +12,8 @@ MOST_HUNG = 4
 class Bounded:
     """Calls one kind of work, each time in a thread of its own.
 
-    A thread that hangs cannot be ended from outside. It is left behind until its work ends, and
-    does not keep the process alive.
+    After the time its connections are cut, which ends it. A thread that waits for something else
+    cannot be ended from outside: it is left behind, and does not keep the process alive.
 
     Args:
         name: of the threads.
@@ -21,15 +23,12 @@ class Bounded:
         self._name = name
         self._hung: list[threading.Thread] = []
 
-    def call(
-        self, work: Callable[[], None], longest: float, cut: Callable[[], None] | None = None
-    ) -> None:
+    def call(self, work: Callable[[], None], longest: float) -> None:
         """Call `work` and wait for it.
 
         Args:
             work: called in the other thread.
             longest: time for it [s].
-            cut: called after that time, to make `work` return.
 
         Raises:
             TimeoutError: it has not returned in time, or too many calls before it have not yet.
@@ -37,11 +36,16 @@ class Bounded:
         self._hung = [thread for thread in self._hung if thread.is_alive()]
         if len(self._hung) >= MOST_HUNG:
             raise TimeoutError(f"{MOST_HUNG} earlier calls have not returned")
-        thread = threading.Thread(target=work, name=self._name, daemon=True)
+        connections = Connections()
+
+        def watched() -> None:
+            with connections.watched():
+                work()
+
+        thread = threading.Thread(target=watched, name=self._name, daemon=True)
         thread.start()
         thread.join(longest)
         if thread.is_alive():
-            if cut is not None:
-                cut()
+            connections.cut()
             self._hung.append(thread)
             raise TimeoutError(f"not finished within {longest:g} s")

@@ -20,6 +20,7 @@ from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.messages import ALARMS, HEALTH, Health
 from rigwatch.wire.rig_config import WitnessSection
 from rigwatch.witness import delivery
+from rigwatch.witness.bounded import MOST_HUNG
 from rigwatch.witness.notices import Notice
 from rigwatch.witness.process import Witness
 from tests.waiting import eventually
@@ -142,20 +143,27 @@ def test_a_recipient_that_hangs_fills_only_its_own_queue(tmp_path: Path, webhook
     assert bench.counted("waiting") <= delivery.WAITING
 
 
-def test_an_address_that_answers_without_end_fails_and_does_not_hold_what_follows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("scheme", ["json", "jsons", "mailto"])
+def test_addresses_that_answer_without_end_fail_and_hold_neither_threads_nor_what_follows(
+    scheme: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(delivery, "ADDRESS_S", 0.1)
+    monkeypatch.setattr(delivery, "ADDRESS_S", 0.3)
     monkeypatch.setattr(delivery, "RETRIES_S", ())
     with Drip() as drip:
-        url = f"json://127.0.0.1:{drip.server_address[1]}"
+        whom = "?to=a@b.example&from=a@b.example" if scheme == "mailto" else ""
+        url = f"{scheme}://127.0.0.1:{drip.server_address[1]}/{whom}"
         bench = Bench(tmp_path, f'[[recipients]]\nname = "hook"\nurl = "{url}"\n')
-        for name in ("loss", "stale"):
-            bench.monitor.publish(ALARMS, fault(name))
-        eventually(lambda: bench.counted("given_up") == 2.0, "both have failed")
+        for count in range(MOST_HUNG + 2):
+            bench.monitor.publish(ALARMS, fault(f"alarm-{count}"))
+        eventually(lambda: bench.counted("given_up") == MOST_HUNG + 2.0, "all have failed")
         assert bench.health is not None
         assert bench.health.text == "notifications to hook fail"
+        eventually(lambda: "notify" not in names_of_threads(), "no attempt is left behind")
         drip.shutdown()
+
+
+def names_of_threads() -> list[str]:
+    return [thread.name for thread in threading.enumerate()]
 
 
 _CHILD = """

@@ -21,7 +21,8 @@ from rigwatch.wire.rig_config import SecuritySection, WitnessSection
 from rigwatch.witness import beats
 from rigwatch.witness.beats import Pinger
 from rigwatch.witness.bounded import MOST_HUNG
-from rigwatch.witness.cut_request import CutRequest
+from rigwatch.witness.connections import Connections
+from rigwatch.witness.http_ping import why_not
 from rigwatch.witness.metrics import MOST_SOURCES, Endpoint, Figures
 from rigwatch.witness.process import Witness
 from tests.access.secured_rig import make_keys
@@ -222,11 +223,13 @@ def test_a_redirection_is_followed_and_a_refusal_is_told_by_its_number() -> None
     server = HTTPServer(("127.0.0.1", 0), Moved)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     url = f"http://127.0.0.1:{server.server_port}"
-    assert CutRequest(f"{url}/old", 5.0).ask() == ""
+    assert why_not(f"{url}/old", 5.0) == ""
     assert Moved.hits == ["/old", "/new"]
-    assert CutRequest(f"{url}/gone", 5.0).ask() == "the server answers 404"
-    cut = CutRequest(f"{url}/new", 5.0)
+    assert why_not(f"{url}/gone", 5.0) == "the server answers 404"
+    cut = Connections()
     cut.cut()
-    assert cut.ask() != ""
+    with cut.watched():
+        assert why_not(f"{url}/new", 5.0) == "the time for it is over"
+    assert why_not(f"{url}/new", 5.0) == "", "others of this thread are not cut"
     server.shutdown()
     server.server_close()
