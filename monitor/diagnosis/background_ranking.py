@@ -30,6 +30,8 @@ from rigwatch.wire.messages import (
 
 NAMED = ("departure", "dry_friction", "other_fault")
 """Alarms that request an explanation; stiction already has its name."""
+FORCE = "friction_force"
+"""Column with the force of dry friction [N], of a monitor that estimates it alone."""
 WAIT = 2.0
 """Time from the onset to the ranking [s]."""
 KEPT = 20.0
@@ -51,6 +53,8 @@ class Explainer:
         self._model, self._files = model, tuple(effect_files)
         self._judged: deque[Judged] = deque()
         self._wanted: Alarm | None = None
+        self._force = 0.0
+        self._friction: tuple[int, int] | None = None
         self._told: dict[tuple[int, int], str] = {}
         self._results: queue.SimpleQueue[tuple[Alarm, Event, str]] = queue.SimpleQueue()
         self._thread: threading.Thread | None = None
@@ -64,6 +68,7 @@ class Explainer:
         if self._judged and self._judged[-1][0].boot != block.boot:
             self._judged.clear()
         self._judged.append((_needed(block), samples))
+        self._force = _force(block)
         rate, alarm = self._model().sample_rate, self._wanted
         while self._judged[0][0].seq < block.seq - KEPT * rate:
             self._judged.popleft()
@@ -71,7 +76,8 @@ class Explainer:
             return
         if block.seq + len(block) - alarm.onset_seq >= WAIT * rate:
             self._wanted = None
-            arguments = (list(self._judged), alarm, self._model())
+            force = self._force if self._friction == (alarm.boot, alarm.onset_seq) else 0.0
+            arguments = (list(self._judged), alarm, self._model(), force)
             self._thread = threading.Thread(target=self._rank, args=arguments, daemon=True)
             self._thread.start()
 
@@ -80,6 +86,8 @@ class Explainer:
         if alarm.name == "stiction" and alarm.state == "unacknowledged":
             self._wanted = None
         key = (alarm.boot, alarm.onset_seq)
+        if alarm.name == "dry_friction":
+            self._friction = key
         if alarm.state == "unacknowledged" and alarm.name in NAMED and key not in self._told:
             self._told[key] = ""
             self._wanted = alarm
@@ -113,7 +121,7 @@ class Explainer:
     def _busy(self) -> bool:
         return self._thread is not None and self._thread.is_alive()
 
-    def _rank(self, judged: Sequence[Judged], alarm: Alarm, model: RigModel) -> None:
+    def _rank(self, judged: Sequence[Judged], alarm: Alarm, model: RigModel, force: float) -> None:
         signals, change = _arrays(judged, model.channels)
         onset = max(alarm.onset_seq - judged[0][0].seq, 0)
         text = ""
@@ -122,9 +130,20 @@ class Explainer:
         if self._ended:
             return
         text = text or "probably missing: cannot tell, the ranking failed"
+        if force > 0.0:
+            # The force at the name is of a part of a period, in which contacts are still settling.
+            text += f"; the friction is {force:.2g} N by now"
         at = int(judged[-1][0].t_ns[-1])
         event = Event("monitor", at, alarm.severity, PROBABLY_MISSING, f"{alarm.name}: {text}")
         self._results.put((alarm, event, text))
+
+
+def _force(block: EstimateBlock) -> float:
+    """The force of dry friction at the end of a block [N]; 0 if it is not estimated."""
+    try:
+        return float(block.column(FORCE).values[-1])
+    except KeyError:
+        return 0.0
 
 
 def _needed(block: EstimateBlock) -> EstimateBlock:

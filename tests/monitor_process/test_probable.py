@@ -1,5 +1,7 @@
 """An alarm is followed by what is probably missing, ranked without making samples wait."""
 
+import re
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,8 +22,11 @@ from rigwatch.simulated import simulate
 from rigwatch.wire.messages.blocks import concatenate, pieces
 from rigwatch.wire.messages.message_types import Alarm, Event, SampleBlock
 from rigwatch.wire.session import open_session
+from sim_plant.excitation import Sine
 from sim_plant.scenario import Event as Fault
 from sim_plant.scenario import load_scenario
+from tests.monitor import observed_rig
+from tests.monitor.observed_rig import coulomb
 from tests.report.drive import COULOMB, VISCOUS, block
 from tests.report.drive import MODEL as INERTIA
 from tests.waiting import eventually
@@ -154,16 +159,16 @@ def test_a_file_of_effects_that_does_not_fit_is_reported_in_the_answer(tmp_path:
     assert "mine.toml" in text
 
 
-def test_friction_on_the_simulated_rig_is_named_after_its_alarm() -> None:
-    monitor, explainer = RigMonitor(RIG), Explainer(lambda: RIG)
-    for whole in open_session(RECORDINGS / "friction.mcap").samples():
-        for piece in pieces(whole, 16):
-            watched = monitor.update(piece)
-            assert watched is not None
-            explainer.take(watched.estimates, piece)
-            for said in watched.announcements:
-                if isinstance(said, Alarm):
-                    explainer.hear(said)
+def ranked(model: RigModel, blocks: Iterable[SampleBlock]) -> tuple[str, list[Alarm]]:
+    """What is told after the first alarm of a run, and the alarms that then stand."""
+    monitor, explainer = RigMonitor(model), Explainer(lambda: model)
+    for piece in blocks:
+        watched = monitor.update(piece)
+        assert watched is not None
+        explainer.take(watched.estimates, piece)
+        for said in watched.announcements:
+            if isinstance(said, Alarm):
+                explainer.hear(said)
     found: list[Event] = []
 
     def explained() -> bool:
@@ -173,8 +178,23 @@ def test_friction_on_the_simulated_rig_is_named_after_its_alarm() -> None:
     eventually(explained, "the change is explained")
     assert len(found) == 1
     assert found[0].code == "PROBABLY MISSING"
+    return found[0].text, explainer.with_causes(monitor.alarms.standing())
+
+
+def test_friction_on_the_simulated_rig_is_named_after_its_alarm() -> None:
+    recording = open_session(RECORDINGS / "friction.mcap")
+    blocks = (piece for whole in recording.samples() for piece in pieces(whole, 16))
+    text, standing = ranked(RIG, blocks)
     plain = "(dry surfaces resist sliding with a force that does not depend on speed)"
-    assert f"probably missing: coulomb@load {plain}: explains " in found[0].text
-    assert "of the change, by chance less than once in a million" in found[0].text
-    standing = explainer.with_causes(monitor.alarms.standing())
+    assert f"probably missing: coulomb@load {plain}: explains " in text
+    assert "of the change, by chance less than once in a million" in text
     assert any("probably missing: coulomb@load" in alarm.cause for alarm in standing)
+
+
+@pytest.mark.parametrize("force", [0.2, 0.5])
+def test_its_force_is_told_again_after_whole_periods(force: float) -> None:
+    slow = observed_rig.run(Sine(amplitude=1.0, frequency=4.0), 8.0, coulomb(5.0, force), seed=44)
+    text, _ = ranked(observed_rig.model(), pieces(observed_rig.block(slow), 16))
+    told = re.search(r"; the friction is ([\d.]+) N by now$", text)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(force, rel=0.1)
