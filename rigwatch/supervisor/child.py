@@ -53,7 +53,7 @@ class Child:
         self.close_run()
         environment = {k: v for k, v in os.environ.items() if not k.startswith("WATCHDOG_")}
         environment |= {"NOTIFY_SOCKET": self._address, "PYTHONUNBUFFERED": "1"}
-        self.vitals = Vitals(now)
+        self.vitals = Vitals(now, reads_device=self.plan.source == "plant")
         self.last_line = ""
         self._output, writing = os.pipe()
         os.set_blocking(self._output, False)

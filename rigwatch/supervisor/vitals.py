@@ -5,7 +5,10 @@ its loop runs but no sample passes although its source has samples. A process th
 source is healthy.
 """
 
+import math
 from dataclasses import dataclass, field
+
+from rigwatch.wire.host.heartbeat import WAITS
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,9 +50,13 @@ class Vitals:
         advanced_at: when the count last increased.
         flowing_since: since when it has increased without a pause.
         status: its own status line for people.
+        reads_device: whether it reads the device itself, and so knows that none is there: a
+            simulated one has samples while its cable is unplugged, too.
+        waited_at: when it last said that it waits.
     """
 
     started_at: float
+    reads_device: bool = False
     heard_at: float = field(init=False)
     ready: bool = False
     ready_at: float = field(init=False)
@@ -58,6 +65,7 @@ class Vitals:
     advanced_at: float = field(init=False)
     flowing_since: float = field(init=False)
     status: str = ""
+    waited_at: float = -math.inf
 
     def __post_init__(self) -> None:
         self.heard_at = self.ready_at = self.started_at
@@ -76,6 +84,8 @@ class Vitals:
                 self.status = value
             elif name == "X_RIGWATCH_COUNT" and value.isdigit():
                 self._count(int(value), now)
+        if self.status.startswith(WAITS):
+            self.waited_at = now
 
     def _is_ready(self, now: float) -> None:
         if not self.ready:
@@ -102,6 +112,8 @@ class Vitals:
             return f"hangs: silent for {limits.silence:g} s"
         if source is not None and source.flows(now):
             dry_since = max(self.advanced_at, self.ready_at, source.flowing_since)
+            if self.reads_device:
+                dry_since = max(dry_since, self.waited_at)
             if now - dry_since > limits.stall:
                 return f"takes no samples for {limits.stall:g} s while its source has them"
         return ""

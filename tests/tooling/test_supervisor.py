@@ -196,6 +196,28 @@ def test_a_source_that_has_just_come_back_gives_its_readers_time() -> None:
     assert "takes no samples" in reader.complaint(source, 101.6, LIMITS)
 
 
+def test_a_process_that_says_its_device_is_gone_is_not_started_again_for_having_no_samples() -> (
+    None
+):
+    source, daq = Vitals(0.0), Vitals(0.0, reads_device=True)
+    recorder = Vitals(0.0)
+    for vitals in (source, daq, recorder):
+        vitals.take("READY=1\nX_RIGWATCH_COUNT=5", now=1.0)
+    seconds = [0.25 * turn for turn in range(8, 130)]
+    for now in seconds:
+        source.take(f"X_RIGWATCH_COUNT={now * 256:.0f}", now=now)
+        for vitals in (daq, recorder):
+            vitals.take("STATUS=waits: no device matches\nX_RIGWATCH_COUNT=5", now=now)
+        assert daq.complaint(source, now, LIMITS) == ""
+    assert "takes no samples" in recorder.complaint(source, seconds[-1], LIMITS)
+    # Plugged in again it has as long as ever to take samples.
+    for turn in range(1, round(LIMITS.stall / 0.25) + 2):
+        now = seconds[-1] + 0.25 * turn
+        source.take(f"X_RIGWATCH_COUNT={now * 256:.0f}", now=now)
+        daq.take("STATUS=running\nX_RIGWATCH_COUNT=5", now=now)
+        assert bool(daq.complaint(source, now, LIMITS)) == (now > seconds[-1] + LIMITS.stall)
+
+
 def test_a_process_whose_supervisor_was_killed_while_it_started_does_not_start() -> None:
     late = partial(die_with, os.getpid() + 1)
     started = subprocess.run([sys.executable, "-c", ""], check=False, preexec_fn=late)

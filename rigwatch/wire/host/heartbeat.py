@@ -21,6 +21,8 @@ from collections.abc import Callable, Mapping
 
 INTERVAL = 0.25
 """Shortest time between two notifications [s]."""
+WAITS = "waits: "
+"""What the status of a process begins with that waits for others."""
 WAITS_AFTER = 5.0
 """Time without samples after which a process says that it waits [s]."""
 
@@ -70,7 +72,7 @@ class Heartbeat:
         waits = waits if now - self._grown_at >= WAITS_AFTER else ""
         words = ["WATCHDOG=1"] if count > self._said_count or waits else []
         if waits != self._waits:
-            words.append(f"STATUS={f'waits: {waits}' if waits else 'running'}")
+            words.append(f"STATUS={WAITS + waits if waits else 'running'}")
         self._said_at, self._said_count, self._waits = now, count, waits
         self._say("\n".join([*words, f"X_RIGWATCH_COUNT={count}"]))
 
