@@ -39,10 +39,12 @@ demo: $(STAMPS)/run  ## simulated rig, monitor and live dashboard: friction appe
 
 SYNC := $(if $(filter output-sync,$(.FEATURES)),--output-sync=target)
 
+# Debian's packages come beside Python's: both mostly wait for the network, and say how far they are.
 # The packages of the tests are installed and the tests read while the demo makes its model, whose
 # kernels the tests use. The demo's rig then mostly waits, and types are checked in what the tests
 # leave of the cores: both run beside them.
-test: $(STAMPS)/run  ## everything that is checked: style, types, layers, demo, tests
+test:  ## everything that is checked: style, types, layers, demo, tests
+	@$(MAKE) --no-print-directory -j2 $(STAMPS)/run viewer-packages
 	@$(MAKE) --no-print-directory -j6 $(SYNC) unit demo-headless lint sbom FIRST="commissioned tests-read"
 
 lint: $(STAMPS)/dev  ## ruff, mypy --strict and the rules of which layer imports which

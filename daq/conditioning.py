@@ -24,7 +24,7 @@ import numpy as np
 from daq.adapter import RawBlock
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.device import Calibration
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 from rigwatch.wire.messages import ByteArray, Column, SampleBlock
 from rigwatch.wire.messages import quality_flags as quality
 from rigwatch.wire.rig_config import ChannelSection
@@ -160,7 +160,7 @@ def _judge(  # noqa: PLR0917 -- a compiled kernel takes no keywords
                 values[i, k] = state[k].good
 
 
-@kernel()
+@part()
 def _is_constant(s: Any, stuck_after: int) -> bool:
     """Whether the code has been constant for longer than this channel's usually is."""
     if stuck_after == 0 or s.equal < stuck_after:
@@ -170,7 +170,7 @@ def _is_constant(s: Any, stuck_after: int) -> bool:
     return bool(((s.repeats + 1.0) / (s.steps + 2.0)) ** s.equal < _IMPROBABLE)
 
 
-@kernel()
+@part()
 def _others_move(state: Any, k: int, within: int) -> bool:
     if len(state) == 1:
         return False
@@ -180,7 +180,7 @@ def _others_move(state: Any, k: int, within: int) -> bool:
     return True
 
 
-@kernel()
+@part()
 def _flags_of(code: float, value: float, limits: FloatArray, s: Any) -> int:
     s.since_good += 1
     if not np.isfinite(value):

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 from sim_plant.strengths import largest_share, strength_at
 
 RATE = 256.0
@@ -138,12 +138,12 @@ def strength_for(name: str, force: FloatArray, share: float, *, held: bool = Fal
     return strength_at(share, caused, least=1e-6)
 
 
-@kernel()
+@part()
 def _clipped(value: float, limit: float) -> float:
     return max(-limit, min(limit, value))
 
 
-@kernel()
+@part()
 def _drive_force(force: FloatArray, place: int, held: bool) -> float:
     """The force at a step, between the samples of `force` [N]."""
     place = max(place, 0)
@@ -152,7 +152,7 @@ def _drive_force(force: FloatArray, place: int, held: bool) -> float:
     return force[row] + part * (force[following] - force[row])
 
 
-@kernel()
+@part()
 def _after_drive(u: float, e: Record, memory: Record) -> float:
     """The force that is left of u behind dead band, saturation and hysteresis of the drive [N]."""
     if e.dead_band > 0:
@@ -165,7 +165,7 @@ def _after_drive(u: float, e: Record, memory: Record) -> float:
     return u
 
 
-@kernel()
+@part()
 def _forces_of_the_motion(x: float, v: float, t: float, e: Record) -> float:
     """Hidden forces that depend on the present motion alone, without dry friction [N]."""
     force = e.quadratic_drag * v * abs(v) + e.cubic_stiffness * x**3
@@ -180,7 +180,7 @@ def _forces_of_the_motion(x: float, v: float, t: float, e: Record) -> float:
     return -force
 
 
-@kernel()
+@part()
 def _forces_with_memory(v: float, e: Record, memory: Record) -> float:
     """Hidden forces that remember the motion, after a step of it [N]."""
     force = 0.0
@@ -200,7 +200,7 @@ def _forces_with_memory(v: float, e: Record, memory: Record) -> float:
     return force
 
 
-@kernel()
+@part()
 def _under_friction(v: float, other: float, dry: float) -> tuple[float, float]:
     """Acceleration and velocity after a step under the other forces and dry friction."""
     if dry > 0 and abs(v) * MASS < dry * H and abs(other) <= dry:

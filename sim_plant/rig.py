@@ -5,7 +5,7 @@ Effects of `sim_plant.effects` can be set or ramped at any sample.
 
 A cylinder integrates, and with a rod on one side only it creeps, so two measures hold it at mid
 stroke for days. A one-time null adjustment of the valve makes 0 V balance the two areas
-(`plant_kernel.balance`). A slow centring loop adds to the commanded voltage: its own pick-off,
+(`pneumatic.balance`). A slow centring loop adds to the commanded voltage: its own pick-off,
 low-passed at 0.7 Hz, times -16 V/m, which gives a corner near 0.2 Hz and about 10 mV at 8 Hz. The
 addition reaches the valve, so it is part of the measured voltage.
 """
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rigwatch.wire.errors import ModelError
 from sim_plant import effects as table
 from sim_plant.parameters import RigParameters, as_record
-from sim_plant.plant_kernel import DELAY_LINE, STATE_TYPE, TRUTH, advance_plant, balance
+from sim_plant.pneumatic import DELAY_LINE, STATE_TYPE, TRUTH, advance_plant, balance
 from sim_plant.sensor_kernel import (
     SENSOR_DELAY_LINE,
     SENSOR_STATE_TYPE,
@@ -40,7 +40,7 @@ class RawSamples:
         seq: number of each sample, int64 of shape (n,).
         device_us: the device's clock at each sample [us], int64 of shape (n,).
         codes: converter codes of voltage, position and acceleration, int16 of shape (n, 3).
-        truth: true values in SI units by name (see `plant_kernel.TRUTH`), float64 of shape (n,).
+        truth: true values in SI units by name (see `pneumatic.TRUTH`), float64 of shape (n,).
     """
 
     seq: NDArray[np.int64]

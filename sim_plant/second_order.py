@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 Floats = NDArray[np.float64]
 
@@ -80,13 +80,13 @@ def simulate(fault: Fault) -> Floats:
     out = np.empty((count, 3))
     state = np.zeros(2)
     at_samples = _input(_grid(count, STEP))
-    for part, add in ((slice(0, begins), Fault(0.0, 0.0)), (slice(begins, count), fault)):
-        fine_part = slice(part.start * _SUBSTEPS, part.stop * _SUBSTEPS)
+    for span, add in ((slice(0, begins), Fault(0.0, 0.0)), (slice(begins, count), fault)):
+        fine_span = slice(span.start * _SUBSTEPS, span.stop * _SUBSTEPS)
         damping = DAMPING + add.viscous
         matrix, gain = _exact(damping, fine)
         settings = np.array([MASS, STIFFNESS, damping, add.coulomb, fine])
-        inputs = (_input(middles[fine_part]), at_samples[part])
-        _run(state, matrix, gain, *inputs, settings, out[part])
+        inputs = (_input(middles[fine_span]), at_samples[span])
+        _run(state, matrix, gain, *inputs, settings, out[span])
     return out
 
 
@@ -111,7 +111,7 @@ def _noisy(signal: Floats, time: Floats, random: np.random.Generator) -> Floats:
     return signal + random.uniform(-width, width, signal.size)
 
 
-@kernel()
+@part()
 def _braked(velocity: float, impulse: float) -> tuple[float, float]:
     """The velocity after dry friction, which cannot reverse it, and the rest of `impulse`."""
     used = min(abs(velocity), impulse)

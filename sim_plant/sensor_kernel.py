@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 Record = Any
 """One record of a structured array; numba compiles its fields as attributes."""
@@ -41,7 +41,7 @@ def high_passed(value: float, warped: float, s: Record) -> float:
     return out
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def delayed(value: float, line: Floats, sample: int, late: float) -> float:
     """`value` delayed by `late` samples, interpolated linearly."""
     line[sample % SENSOR_DELAY_LINE] = value
@@ -52,7 +52,7 @@ def delayed(value: float, line: Floats, sample: int, late: float) -> float:
     return value + part * line[(sample - whole - 1) % SENSOR_DELAY_LINE]
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def reading(  # noqa: PLR0917
     value: float,
     noise: float,

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -60,7 +60,7 @@ class Loads(NamedTuple):
     record_step: float
 
 
-@kernel()
+@part()
 def pull(law: int, k: float, length: float, d: float) -> float:
     """Force of the law itself at elongation d [N]."""
     if law == HARDENING:
@@ -103,7 +103,7 @@ def push(loads: Loads, t: float, middle: float, force: Floats) -> float:
     return base
 
 
-@kernel()
+@part()
 def accelerate(  # noqa: PLR0917 -- a kernel
     t: float,
     middle: float,
@@ -163,8 +163,8 @@ def integrate(  # noqa: C901, PLR0912, PLR0917 -- a kernel
         if point + 1 == grid.size:
             break
         step = (grid[point + 1] - grid[point]) / parts
-        for part in range(parts):
-            t = grid[point] + part * step
+        for nth in range(parts):
+            t = grid[point] + nth * step
             middle = t + 0.5 * step
             for level in range(4):
                 count = 2 * (level + 1)

@@ -34,6 +34,9 @@ else
     give_up "not allowed to install$missing"
 fi
 
+# Two that run beside each other would find the packages locked.
+exec 9<"$0"
+flock 9
 echo "setup: installing Debian packages$missing"
 install() {
     $as_root env DEBIAN_FRONTEND=noninteractive \

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from daq.adapter import RawBlock
 from rigwatch.wire.arrays import IntArray
 from rigwatch.wire.device import CRC_SIZE, HEAD_SIZE, LONGEST, VERSION
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 from rigwatch.wire.messages import ByteArray
 
 _POLYNOMIAL = 0xEDB88320
@@ -76,7 +76,7 @@ def _read(
     return found
 
 
-@kernel()
+@part()
 def _unstuff(data: ByteArray, at: int, end: int, frame: ByteArray) -> int:
     """Write the payload of the COBS frame from `at` to `end`; its length, -1 if it is none."""
     if end - at > frame.size:
@@ -96,7 +96,7 @@ def _unstuff(data: ByteArray, at: int, end: int, frame: ByteArray) -> int:
     return size
 
 
-@kernel()
+@part()
 def _checksum(frame: ByteArray, size: int) -> int:
     """CRC-32 of the first bytes."""
     value = np.uint32(0xFFFFFFFF)
@@ -105,7 +105,7 @@ def _checksum(frame: ByteArray, size: int) -> int:
     return int(value ^ np.uint32(0xFFFFFFFF))
 
 
-@kernel()
+@part()
 def _u32(frame: ByteArray, at: int) -> int:
     low = np.int64(frame[at]) | np.int64(frame[at + 1]) << 8
     return int(low | np.int64(frame[at + 2]) << 16 | np.int64(frame[at + 3]) << 24)

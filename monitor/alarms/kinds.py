@@ -85,8 +85,9 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "stale",
         "critical",
         "no samples arrive although the line is open",
-        "Check that device and daq are running (`rigwatch doctor CONFIG`). Do not trust the last "
-        "values.",
+        "Check that device and daq are running (`rigwatch doctor CONFIG`). If they are, this "
+        "machine may be too busy to read them in time: check that the load that `uptime` prints is "
+        "below the number of cores (`nproc`). Do not trust the last values.",
         _AT_ONCE,
     ),
     AlarmKind(

@@ -20,11 +20,10 @@ near 1 and nothing is reported; a channel that does not move at all is stuck, no
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 SPAN = 256
 """Samples. Extremes are those of the running span and of the one before it, so that a peak from
@@ -114,7 +113,7 @@ def judge_flat_tops(  # noqa: PLR0917
             state.extreme[0, :, :] = -np.inf
 
 
-@njit()
+@part()
 def _trial(  # noqa: PLR0917
     side: float, c: int, end: int, chance: float, limit: float, state: FlatTops
 ) -> None:
@@ -132,6 +131,6 @@ def _trial(  # noqa: PLR0917
     state.extreme[0, c, end] = max(state.extreme[0, c, end], side)
 
 
-@njit()
+@part()
 def _extreme(state: FlatTops, c: int, end: int) -> float:
     return max(state.extreme[0, c, end], state.extreme[1, c, end])

@@ -8,7 +8,6 @@ own channel, and not every fault shows in the estimates.
 # mypy: disable-error-code="no-any-return"
 
 import numpy as np
-from numba import njit
 
 from monitor.decision.estimates import spread_of_change
 from monitor.decision.kernel_state import (
@@ -28,12 +27,13 @@ from monitor.reference import (
     FIXED,
     Reference,
 )
+from rigwatch.wire.kernel import part
 
 _NOISES = 6.0
 """Rms over a window that noise alone does not exceed, in standard deviations of the channel."""
 
 
-@njit(inline="always")
+@part(inline="always")
 def moved(energies: Energies, signal: int, count: int) -> float:
     """Root mean square of the newest `count` samples."""
     if count >= energies.rows.shape[0]:
@@ -41,7 +41,7 @@ def moved(energies: Energies, signal: int, count: int) -> float:
     return np.sqrt(recent_energy(energies, signal, count) / max(count, 1))
 
 
-@njit(inline="always")
+@part(inline="always")
 def position_limit(rules: Rules, ref: Reference) -> float:
     """Allowed rms deviation of the position from its healthy period [m]."""
     return max(
@@ -49,13 +49,13 @@ def position_limit(rules: Rules, ref: Reference) -> float:
     )
 
 
-@njit(inline="always")
+@part(inline="always")
 def voltage_limit(rules: Rules, ref: Reference) -> float:
     """Allowed rms deviation of the voltage from its healthy period [V]."""
     return max(_NOISES * ref.levels.voltage_noise, rules.voltage_floor * ref.levels.swing)
 
 
-@njit(inline="always")
+@part(inline="always")
 def departed(rules: Rules, ref: Reference, state: WatchState) -> bool:
     """Whether any statistic exceeds its limit; stores the largest as deviation, in units of k."""
     held, energies = state.held, state.energies

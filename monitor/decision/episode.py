@@ -5,8 +5,6 @@ samples. Between episodes the healthy average is extended.
 # Compiled functions are untyped to mypy.
 # mypy: disable-error-code="no-any-return"
 
-from numba import njit
-
 from monitor.decision.departure import moved, position_limit, voltage_limit
 from monitor.decision.estimates import spread_of_change
 from monitor.decision.isolation import HISTORY, evidence_of, swing_of_voltage_change
@@ -40,6 +38,7 @@ from monitor.reference import (
     restart,
 )
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import part
 
 ENDS_AFTER = 64
 """Number of quiet samples that end an episode."""
@@ -58,7 +57,7 @@ SHORTEST_CYCLE, LONGEST_CYCLE = 32, 256
 """Limits of the number of samples judged: evidence needs some, a slow drive must not delay it."""
 
 
-@njit(inline="always")
+@part(inline="always")
 def follow(  # noqa: PLR0917
     out: bool,
     seq: int,
@@ -84,7 +83,7 @@ def follow(  # noqa: PLR0917
             clear(state, rules.window)
 
 
-@njit(inline="always")
+@part(inline="always")
 def _count(out: bool, state: WatchState) -> None:
     """Begin, continue or end the episode."""
     counts, held = state.counts, state.held
@@ -101,7 +100,7 @@ def _count(out: bool, state: WatchState) -> None:
             held[EXPLAINED] = held[SHARE] = held[RHO] = held[REST] = 0.0
 
 
-@njit()
+@part()
 def _look(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
     """Evaluate the evidence since the departure and update the verdict."""
     held, since = state.held, state.counts.episode
@@ -121,7 +120,7 @@ def _look(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
     held[VERDICT] = verdict(_seen(since, cycle, rules, ref, state), evidence, state)
 
 
-@njit()
+@part()
 def _seen(since: int, cycle: int, rules: Rules, ref: Reference, state: WatchState) -> Seen:
     """Channels that have deviated since the departure."""
     energies, count = state.energies, min(since, LONG)

@@ -11,7 +11,6 @@ number of periods in the healthy average, whose own error does not average out.
 # mypy: disable-error-code="no-any-return"
 
 import numpy as np
-from numba import njit
 
 from monitor.decision.kernel_state import (  # fmt: skip
     CONDITION,
@@ -35,6 +34,7 @@ from monitor.reference import (
     FIXED,
     Reference,
 )
+from rigwatch.wire.kernel import part
 
 STANDING = 2 * LONG
 """Samples at rest after which a rig with an aperiodic drive stands still."""
@@ -44,7 +44,7 @@ _APERIODIC_VARIANCE = 9.0
 """Factor for aperiodic drives, for which the residual itself is judged: it peaks at about 3 rms."""
 
 
-@njit(inline="always")
+@part(inline="always")
 def spread_of_change(ref: Reference) -> float:
     """Standard deviation of the change of the residual, including the healthy average's error."""
     if ref.counts.source == APERIODIC:
@@ -54,7 +54,7 @@ def spread_of_change(ref: Reference) -> float:
     return ref.levels.noise * np.sqrt(1.0 + 4.0 / max(ref.counts.depth, 1))
 
 
-@njit(inline="always")
+@part(inline="always")
 def _stands(ref: Reference, state: WatchState) -> bool:
     """Whether the rig is at rest: the velocity is then what its filter keeps of the motion before.
 
@@ -66,7 +66,7 @@ def _stands(ref: Reference, state: WatchState) -> bool:
     return state.counts.still >= length
 
 
-@njit(inline="always")
+@part(inline="always")
 def estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
     """Write θ, its limits, D and the observability of friction to `state.held`."""
     held, s = state.held, state.sums
@@ -95,7 +95,7 @@ def estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
         _judge_by_band(rules, state)
 
 
-@njit()
+@part()
 def _judge_by_band(rules: Rules, state: WatchState) -> None:
     """Test against fixed limits, where the deviation is k; a partly filled window is ignored."""
     held, place = state.held, state.window.place

@@ -24,12 +24,12 @@ position and acceleration, is stiction; no smooth fault does that.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from monitor.reference import Reference, place_in_period
 from rigwatch.physics.transfer import filter_sample
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import part
 
 HISTORY = 512
 """Number of samples stored for isolation."""
@@ -107,7 +107,7 @@ def new_history(b: FloatArray, a: FloatArray) -> History:
     return History(np.zeros((HISTORY, 7)), np.zeros(1, np.int64), b, a)
 
 
-@njit(inline="always")
+@part(inline="always")
 def store_sample(  # noqa: PLR0917
     history: History,
     y: float,
@@ -126,7 +126,7 @@ def store_sample(  # noqa: PLR0917
     history.head[0] = head if head < HISTORY else 0
 
 
-@njit()
+@part()
 def evidence_of(history: History, ref: Reference, seq: int, since: int, count: int) -> Evidence:
     """Evidence of the newest `count` samples.
 
@@ -149,7 +149,7 @@ def evidence_of(history: History, ref: Reference, seq: int, since: int, count: i
     return _compare(data.T @ data, rest_of(history, n, ref.levels.position_noise), peak)
 
 
-@njit()
+@part()
 def rest_of(history: History, n: int, noise: float) -> Rest:
     """Rest in one place over the newest `n` samples; stretches in which the mass drifts are none.
 
@@ -172,10 +172,11 @@ def rest_of(history: History, n: int, noise: float) -> Rest:
         far = high - low > DRIFT * noise
         if moving > LEAST_MOTION or (far and k - begin > DRIFT_TIME):
             if not drifts:
-                halves += inside
+                halves[0] += inside[0]
+                halves[1] += inside[1]
                 stops += 1
             begin, low, high, drifts = k, place, place, False
-            inside[:] = 0.0
+            inside[0] = inside[1] = 0.0
             for before in range(max(k - SEEN_OVER + 1, 0), k):
                 place = rows[(first + before) % HISTORY, PLACE]
                 low, high = min(low, place), max(high, place)
@@ -184,12 +185,13 @@ def rest_of(history: History, n: int, noise: float) -> Rest:
         inside[1 if 2 * k >= n else 0] += 1.0
         moving = 0
     if not drifts:
-        halves += inside
+        halves[0] += inside[0]
+        halves[1] += inside[1]
         stops += 1
     return Rest((halves[0] + halves[1]) / n, 2.0 * min(halves[0], halves[1]) / n, stops)
 
 
-@njit()
+@part()
 def swing_of_voltage_change(history: History, count: int) -> float:
     """Standard deviation of the change of voltage over the newest `count` samples [V]."""
     mean = square = 0.0
@@ -200,7 +202,7 @@ def swing_of_voltage_change(history: History, count: int) -> float:
     return np.sqrt(max(square - mean * mean, 0.0))
 
 
-@njit()
+@part()
 def _fill_rivals(data: FloatArray, ref: Reference, seq: int, n: int) -> None:
     period = ref.counts.period
     mean = 0.0
@@ -223,7 +225,7 @@ def _fill_rivals(data: FloatArray, ref: Reference, seq: int, n: int) -> None:
         data[k, 7], data[k, 8], data[k, 9], data[k, 10] = x * x, x * dx, x * x * x, x * x * dx
 
 
-@njit()
+@part()
 def _fill_friction(data: FloatArray, history: History, since: int, n: int) -> None:
     rows, head = history.rows, history.head[0]
     if since >= HISTORY:
@@ -245,7 +247,7 @@ def _fill_friction(data: FloatArray, history: History, since: int, n: int) -> No
             data[place, _RIVALS], data[place, _RIVALS + 1] = g1, g2
 
 
-@njit()
+@part()
 def _compare(gram: FloatArray, rest: Rest, peak: float) -> Evidence:
     """Evidence from the normal matrix of rivals, friction regressors and y, in this order."""
     yy = max(gram[-1, -1], 1e-30)
@@ -267,7 +269,7 @@ def _compare(gram: FloatArray, rest: Rest, peak: float) -> Evidence:
     )
 
 
-@njit()
+@part()
 def _friction_fit(gram: FloatArray, yy: float) -> tuple[float, float]:
     """Shares of y² explained by both friction terms and contained in the Coulomb term alone."""
     y, g1, g2 = gram.shape[0] - 1, _RIVALS, _RIVALS + 1
@@ -281,7 +283,7 @@ def _friction_fit(gram: FloatArray, yy: float) -> tuple[float, float]:
     return explained, max(theta1, 0.0) ** 2 * gram[g1, g1] / yy
 
 
-@njit()
+@part()
 def _gain_over_rivals(gram: FloatArray) -> tuple[float, float, float]:
     """Residual energy of the rivals, the part of it that the jump explains, and the jump's sign."""
     y, g1 = gram.shape[0] - 1, _RIVALS
@@ -297,7 +299,7 @@ def _gain_over_rivals(gram: FloatArray) -> tuple[float, float, float]:
     return remains, jump, 1.0 if left[g1, y] > 0.0 else -1.0
 
 
-@njit()
+@part()
 def _eliminate(gram: FloatArray, pivot: int, least: float) -> None:
     """Project column `pivot` out of all columns; a column already explained is skipped."""
     strength = gram[pivot, pivot]

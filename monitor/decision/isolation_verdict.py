@@ -13,8 +13,6 @@ correlations, so they apply to any rig, drive and unit.
 
 from typing import NamedTuple
 
-from numba import njit
-
 from monitor.decision.isolation import Evidence
 from monitor.decision.kernel_state import (  # fmt: skip
     FRICTION,
@@ -24,6 +22,7 @@ from monitor.decision.kernel_state import (  # fmt: skip
     STICKING,
     WatchState,
 )
+from rigwatch.wire.kernel import part
 
 LOOKS = 3
 """Consecutive tests, four samples apart, that must agree on friction; one may be chance."""
@@ -93,7 +92,7 @@ class Seen(NamedTuple):
     spread: float
 
 
-@njit()
+@part()
 def verdict(seen: Seen, evidence: Evidence, state: WatchState) -> float:
     """The verdict after one more test."""
     # A changed reading of the drive without a changed motion is a fault of that channel.
@@ -110,7 +109,7 @@ def verdict(seen: Seen, evidence: Evidence, state: WatchState) -> float:
     return OTHER if _other(seen, evidence) else seen.before
 
 
-@njit()
+@part()
 def _friction(seen: Seen, evidence: Evidence) -> bool:
     """Whether this test finds dry friction."""
     # Friction acts over many samples: a single large one is a spike of the sensor.
@@ -127,47 +126,47 @@ def _friction(seen: Seen, evidence: Evidence) -> bool:
     return settled and (_jumps(seen, evidence) or _thin(evidence))
 
 
-@njit()
+@part()
 def _jump_seen(seen: Seen, evidence: Evidence) -> bool:
     large = evidence.jump > LEAST_JUMP * seen.spread**2
     return large and evidence.share > LEAST_SHARE and evidence.dry > LEAST_DRY
 
 
-@njit()
+@part()
 def _certain(seen: Seen, evidence: Evidence) -> bool:
     """Pattern: friction explains the change completely."""
     plain = evidence.rho > CERTAIN_RHO and evidence.explained > CERTAIN_FIT
     return plain and _jump_seen(seen, evidence)
 
 
-@njit()
+@part()
 def _plain(evidence: Evidence) -> bool:
     """Pattern: a clear jump, in a change that is mostly friction."""
     fits = evidence.rho > PLAIN_RHO and evidence.explained > PLAIN_FIT
     return fits and evidence.share > PLAIN_SHARE and evidence.dry > PLAIN_DRY
 
 
-@njit()
+@part()
 def _jumps(seen: Seen, evidence: Evidence) -> bool:
     """Pattern: a jump beyond all rivals, in a change of which friction explains more than half."""
     plain = evidence.rho > JUMP_RHO and evidence.explained > JUMP_FIT
     return plain and _jump_seen(seen, evidence)
 
 
-@njit()
+@part()
 def _follows(evidence: Evidence) -> bool:
     """Pattern: a change that follows the friction filter closely."""
     fits = evidence.explained > FOLLOW_FIT and evidence.dry > FOLLOW_DRY
     return fits and evidence.share > FOLLOW_SHARE and evidence.rho > FOLLOW_RHO
 
 
-@njit()
+@part()
 def _thin(evidence: Evidence) -> bool:
     """Pattern: little but the jump."""
     return evidence.share > THIN_SHARE and evidence.rho > THIN_RHO
 
 
-@njit()
+@part()
 def slips(seen: Seen, evidence: Evidence) -> bool:
     """Pattern: the mass is at rest while the healthy one moves."""
     if seen.since < seen.cycle or seen.before == OTHER:
@@ -180,14 +179,14 @@ def slips(seen: Seen, evidence: Evidence) -> bool:
     return long and again and orderly and rubs
 
 
-@njit()
+@part()
 def _slides(evidence: Evidence) -> bool:
     """Whether friction shows in the sliding between stops: as a jump, or as most of the change."""
     jumps = evidence.share > LEAST_SHARE and evidence.rho > JUMP_RHO
     return jumps or (evidence.explained > JUMP_FIT and evidence.dry > LEAST_DRY)
 
 
-@njit()
+@part()
 def _other(seen: Seen, evidence: Evidence) -> bool:
     """Whether the departure is to be named another fault."""
     if seen.since >= GIVE_UP * seen.cycle + LONG:

@@ -7,7 +7,6 @@ episode, from a departure until all statistics are quiet again.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from monitor.decision.isolation import History, new_history
 from monitor.estimation import (
@@ -19,7 +18,9 @@ from monitor.estimation import (
     restart_window,
 )
 from monitor.reference import new_record
+from monitor.signals import fill
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import part
 
 NO_VERDICT, FRICTION, OTHER, STICKING, NEW_EXCITATION = 0, 1, 2, 3, 4
 
@@ -103,14 +104,15 @@ def new_watch_state(
     )
 
 
-@njit()
+@part()
 def clear(state: WatchState, window: int) -> None:
     """Reset to the initial state; the least squares then spans `window` samples."""
     restart_window(state.window, window)
     restart_energies(state.energies)
-    state.history.rows[:, :] = 0.0
+    for row in range(state.history.rows.shape[0]):
+        fill(state.history.rows[row], 0.0)
     counts = state.counts
     counts.episode = counts.quiet = counts.agreed = counts.hop = counts.excited = 0
     counts.still = 0
-    state.held[:] = 0.0
-    state.recent[:] = 0.0
+    fill(state.held, 0.0)
+    fill(state.recent, 0.0)

@@ -11,7 +11,6 @@ Before that, the healthy reference takes the samples until it is armed.
 # mypy: disable-error-code="no-any-return"
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from monitor.decision.departure import departed
@@ -64,10 +63,11 @@ from monitor.signals import (
     VELOCITY,
     VOLTAGE,
     Codes,
+    fill,
 )
 from monitor.signals import MODELLED as MODELLED_COLUMN
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 
 @kernel()
@@ -104,7 +104,7 @@ def watch_block(  # noqa: PLR0917
         _write(data[k], code[k], ref, state, out[:, k])
 
 
-@njit()
+@part()
 def _window_length(wanted: int, ref: Reference, window: Window) -> int:
     """Window of whole periods of the excitation, at least as requested, at most the capacity.
 
@@ -118,17 +118,19 @@ def _window_length(wanted: int, ref: Reference, window: Window) -> int:
     return min(((wanted + period - 1) // period) * period, (room // period) * period)
 
 
-@njit()
+@part()
 def _skip(state: WatchState) -> None:
     """Process a sample that does not count, so that windows keep their length in time."""
-    push(state.window, np.zeros(3))
-    add(state.energies, np.zeros(5))
+    fill(state.row, 0.0)
+    fill(state.signals, 0.0)
+    push(state.window, state.row)
+    add(state.energies, state.signals)
     store_sample(state.history, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if state.counts.episode > 0:
         state.counts.episode += 1
 
 
-@njit(inline="always")
+@part(inline="always")
 def _judge(  # noqa: PLR0917
     data: FloatArray,
     seq: int,
@@ -153,7 +155,7 @@ def _judge(  # noqa: PLR0917
     follow(departed(rules, ref, state), seq, place, data, rules, ref, state)
 
 
-@njit(inline="always")
+@part(inline="always")
 def _take(
     data: FloatArray, place: int, position_valid: int, ref: Reference, state: WatchState
 ) -> None:
@@ -178,7 +180,7 @@ def _take(
     state.held[CHANGE] = y
 
 
-@njit(inline="always")
+@part(inline="always")
 def _at_rest(data: FloatArray, ref: Reference, state: WatchState) -> float:
     """1.0 if position and acceleration are at rest over four samples.
 
@@ -198,7 +200,7 @@ def _at_rest(data: FloatArray, ref: Reference, state: WatchState) -> float:
     return 1.0 if still else 0.0
 
 
-@njit(inline="always")
+@part(inline="always")
 def _count_still(position: float, rest: float, ref: Reference, state: WatchState) -> None:
     """Count the samples at rest in one place, within ten standard deviations of the position."""
     place = state.recent
@@ -211,7 +213,7 @@ def _count_still(position: float, rest: float, ref: Reference, state: WatchState
         place[8] = place[9] = position
 
 
-@njit(inline="always")
+@part(inline="always")
 def _write(data: FloatArray, code: int, ref: Reference, state: WatchState, out: FloatArray) -> None:
     # Estimates hold their last value between solutions; the residual is that of this sample.
     for i in range(out.size):

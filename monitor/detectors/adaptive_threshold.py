@@ -22,7 +22,7 @@ import numpy as np
 
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 NOISE_FACTOR = 4.0
 """Smallest floor, in standard deviations of the residual's noise [1]."""
@@ -69,7 +69,7 @@ def new_threshold_state() -> ThresholdState:
     return ThresholdState(np.zeros(2))
 
 
-@kernel()
+@part()
 def threshold_sample(coefficients: FloatArray, state: ThresholdState, u: float) -> float:
     """J(t) for the next input `u`."""
     floor, gain, ratio, decay = coefficients

@@ -9,7 +9,7 @@ import numpy as np
 
 from rigwatch.physics.transfer import TransferFunction
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import part
 
 
 def decay_factor(corner: float, sample_rate: float) -> float:
@@ -35,7 +35,7 @@ def leaky(function: TransferFunction, corner: float, sample_rate: float) -> Tran
     return TransferFunction.of(function.b, np.real(np.poly(poles)))
 
 
-@kernel()
+@part()
 def high_pass_sample(beta: float, last: FloatArray, high: FloatArray, values: FloatArray) -> None:
     """One sample of several signals: `high` becomes the output, `last` the input."""
     for i in range(values.size):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 
 class NisWindow(NamedTuple):
@@ -38,7 +38,7 @@ def new_nis_window(length: int) -> NisWindow:
     return NisWindow(np.zeros(length), np.zeros(1), np.zeros(2, np.int64))
 
 
-@kernel()
+@part()
 def clear_nis(window: NisWindow) -> None:
     """Empty the window."""
     for k in range(window.values.size):

@@ -33,11 +33,11 @@ from monitor.detectors.adaptive_threshold import (
 )
 from monitor.detectors.detector import Channels, Judgement, SampleDetector, Series
 from monitor.detectors.high_pass import decay_factor
-from monitor.signals import DEAD, HELD, NEW_BOOT, RESTART
+from monitor.signals import DEAD, HELD, NEW_BOOT, RESTART, fill
 from rigwatch.physics.transfer import TransferFunction, filter_sample
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +80,7 @@ def _new_state(order: int) -> ParityState:
     return ParityState(*filters, np.zeros(6), new_threshold_state(), np.zeros(2, np.int64))
 
 
-@kernel()
+@part()
 def small_signal(  # noqa: PLR0917 -- a compiled kernel takes no keywords
     forget: float, u0: float, y0: float, state: ParityState, u: float, y: float
 ) -> None:
@@ -96,7 +96,7 @@ def small_signal(  # noqa: PLR0917 -- a compiled kernel takes no keywords
     point[0], point[1] = u, y
 
 
-@kernel()
+@part()
 def _remove_initial_state(forget: float, state: ParityState, residual: float) -> float:
     """The residual without the effect of the model's initial state."""
     if forget == 1.0:
@@ -107,13 +107,14 @@ def _remove_initial_state(forget: float, state: ParityState, residual: float) ->
     return float(point[5])
 
 
-@kernel()
+@part()
 def _restart(state: ParityState) -> None:
-    state.output[:] = 0.0
-    state.input[:] = 0.0
-    state.point[:] = 0.0
-    state.threshold.memory[:] = 0.0
-    state.counts[:] = 0
+    fill(state.output, 0.0)
+    fill(state.input, 0.0)
+    fill(state.point, 0.0)
+    fill(state.threshold.memory, 0.0)
+    for place in range(state.counts.size):
+        state.counts[place] = 0
 
 
 @kernel()

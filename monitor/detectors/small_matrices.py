@@ -8,7 +8,7 @@ are loops too: an expression of whole arrays takes the compiler seconds.
 import numpy as np
 
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 SMALLEST_PIVOT = 1e-13
 """A pivot below this share of the unit diagonal means a singular matrix [1]."""
@@ -25,7 +25,7 @@ def product(a: FloatArray, b: FloatArray) -> FloatArray:
     return out
 
 
-@kernel()
+@part()
 def product_transposed(a: FloatArray, b: FloatArray) -> FloatArray:
     """a·bᵀ, shape (n, m)."""
     out = np.zeros((a.shape[0], b.shape[0]))
@@ -36,7 +36,7 @@ def product_transposed(a: FloatArray, b: FloatArray) -> FloatArray:
     return out
 
 
-@kernel()
+@part()
 def transposed_product(a: FloatArray, b: FloatArray) -> FloatArray:
     """aᵀ·b, shape (n, m)."""
     out = np.zeros((a.shape[1], b.shape[1]))
@@ -57,7 +57,7 @@ def times(a: FloatArray, x: FloatArray) -> FloatArray:
     return out
 
 
-@kernel()
+@part()
 def put_sum(out: FloatArray, a: FloatArray, b: FloatArray) -> None:
     """out = a + b, of matrices."""
     for i in range(a.shape[0]):
@@ -65,7 +65,7 @@ def put_sum(out: FloatArray, a: FloatArray, b: FloatArray) -> None:
             out[i, j] = a[i, j] + b[i, j]
 
 
-@kernel()
+@part()
 def put_identity(out: FloatArray, scale: float) -> None:
     """out = scale·I."""
     for i in range(out.shape[0]):
@@ -102,7 +102,7 @@ def inverse(matrix: FloatArray, out: FloatArray) -> bool:
     return True
 
 
-@kernel()
+@part()
 def _invert_factor(lower: FloatArray, scale: FloatArray, out: FloatArray) -> None:
     """D·(L·Lᵀ)⁻¹·D from the factor L and the scale D."""
     n = lower.shape[0]

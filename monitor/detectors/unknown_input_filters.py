@@ -36,7 +36,7 @@ from monitor.detectors.state_space import state_space
 from monitor.signals import DEAD, HELD, NEW_BOOT, RESTART
 from rigwatch.physics.transfer import TransferFunction
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +141,7 @@ def new_filter_state(model: FilterModel, window: int) -> FilterState:
     )
 
 
-@kernel()
+@part()
 def _start(model: FilterModel, state: FilterState, beta: float, signals: FloatArray) -> None:
     """Start at the measured position, with unknown motion."""
     for i in range(signals.size):
@@ -157,7 +157,7 @@ def _start(model: FilterModel, state: FilterState, beta: float, signals: FloatAr
     state.counts[0] = 0
 
 
-@kernel()
+@part()
 def _predict(model: FilterModel, x: FloatArray, p: FloatArray, u: float) -> None:
     ahead = times(model.a, x)
     for i in range(x.size):
@@ -165,7 +165,7 @@ def _predict(model: FilterModel, x: FloatArray, p: FloatArray, u: float) -> None
     put_sum(p, product_transposed(product(model.a, p), model.a), model.w)
 
 
-@kernel()
+@part()
 def _step(model: FilterModel, state: FilterState, y: FloatArray) -> float:
     """Update both filters; normalised innovation squared, NaN if a filter failed."""
     nis = kalman_update(state.plain, state.plain_p, model.h, model.v, y)
@@ -177,7 +177,7 @@ def _step(model: FilterModel, state: FilterState, y: FloatArray) -> float:
     return nis if ok else np.nan
 
 
-@kernel()
+@part()
 def _measure(state: FilterState, beta: float, signals: FloatArray, y: FloatArray) -> None:
     """High-pass the signals; `y` becomes the position now and the acceleration one sample ago."""
     high_pass_sample(beta, state.raw, state.high, signals)

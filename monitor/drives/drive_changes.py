@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes
+from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes, fill, push
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kernel import kernel
 
@@ -75,12 +75,11 @@ def _advance(  # noqa: PLR0917 -- a kernel
 ) -> None:
     for k in range(code.size):
         if code[k] == RESTART or code[k] == NEW_BOOT:
-            kept[:] = 0.0
-            last[:] = signal[k]
+            fill(kept, 0.0)
+            fill(last, signal[k])
         if code[k] == DEAD:
             continue
-        last[:-1] = last[1:]
-        last[-1] = signal[k]
+        push(last, signal[k])
         a, b, c, e = last[0], last[APART], last[2 * APART], last[3 * APART]
         squared = c * c - b * e
         first, middle, second = b - a, c - b, e - c

@@ -11,9 +11,9 @@ because the steps of a smooth drive jitter from those of a voltage that is held.
 # mypy: disable-error-code="no-any-return"
 
 import numpy as np
-from numba import njit
 
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import part
 
 MEMORY = 64.0
 """Of the energies that are compared [samples]."""
@@ -45,13 +45,13 @@ def no_edges() -> FloatArray:
     return np.zeros(SINCE + 1)
 
 
-@njit()
+@part()
 def corrected(error: float, moved: float, kept: FloatArray) -> float:
     """The residual of a sample under the assumption that is taken to be true."""
     return error - moved if kept[CHOSEN] > 0.0 else error
 
 
-@njit()
+@part()
 def follow_edges(
     error: float, moved: float, unsure: float, largest: float, kept: FloatArray
 ) -> bool:
@@ -79,7 +79,7 @@ def follow_edges(
     return False
 
 
-@njit()
+@part()
 def undecided(moved: float, kept: FloatArray) -> float:
     """What the residual of a sample may hold until it is told where the edges are; then 0.
 
@@ -92,7 +92,7 @@ def undecided(moved: float, kept: FloatArray) -> float:
     return moved
 
 
-@njit()
+@part()
 def edges_unsure(unsure: float, kept: FloatArray) -> float:
     """Mean square of the residual that edges between samples may have left; 0 for edges at samples.
 

@@ -3,9 +3,8 @@
 # Compiled functions are untyped to mypy.
 # mypy: disable-error-code="no-any-return"
 
-from numba import njit
-
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import part
 
 EDGE = 0.25
 """Step, relative to the largest, above which it is an edge."""
@@ -17,7 +16,7 @@ LAST, LARGEST = range(2)
 """Carried figures: the last sample, and the largest step."""
 
 
-@njit()
+@part()
 def edge(sample: float, kept: FloatArray) -> float:
     """The step to this sample if it is an edge, otherwise 0."""
     step = sample - kept[LAST]

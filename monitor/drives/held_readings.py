@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes
+from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes, fill
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kernel import kernel
 
@@ -63,7 +63,7 @@ LAST, USUAL, SHARE, ROW, AGO, STEP, FOLLOWS = _AT
 def _advance(signal: FloatArray, code: Codes, kept: FloatArray, found: NDArray[np.bool_]) -> None:
     for k in range(code.size):
         if code[k] == RESTART or code[k] == NEW_BOOT:
-            kept[:] = 0.0
+            fill(kept, 0.0)
             kept[LAST], kept[AGO] = signal[k], REMEMBERED
         if code[k] == DEAD:
             continue

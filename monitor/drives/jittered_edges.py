@@ -12,13 +12,12 @@ over the samples. Where between samples they are cannot be told, as it can be of
 # mypy: disable-error-code="no-any-return"
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from monitor.drives.edges import LARGEST, LAST, SHORTEST, edge
-from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes
+from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes, fill, push
 from rigwatch.wire.arrays import BoolArray, FloatArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 COUNT, NEAR = 8, 2.0
 """Intervals that are compared, and difference of two above which the wave is not steady."""
@@ -62,19 +61,20 @@ def _advance(  # noqa: PLR0917 -- a kernel
 ) -> None:
     for k in range(code.size):
         if code[k] == RESTART or code[k] == NEW_BOOT:
-            kept[:] = 0.0
+            fill(kept, 0.0)
             kept[LAST] = signal[k]
             kept[AGO] = REMEMBERED
-            ways[:, FILLED] = -1.0
+            _forget(ways)
         if code[k] == DEAD:
             continue
         step = edge(signal[k], kept)
         kept[AGE] += 1.0
-        ways[:, OWN_AGE] += 1.0
+        ways[0, OWN_AGE] += 1.0
+        ways[1, OWN_AGE] += 1.0
         kept[AGO] = min(kept[AGO] + 1.0, REMEMBERED)
         if step != 0.0:
             if kept[AGE] < SHORTEST:
-                ways[:, FILLED] = -1.0
+                _forget(ways)
             else:
                 way = 1 if step > 0.0 else 0
                 _edge(intervals[way], ways[way], kept)
@@ -82,36 +82,50 @@ def _advance(  # noqa: PLR0917 -- a kernel
         found[k] = kept[AGO] < REMEMBERED
 
 
-@njit()
+@part()
+def _forget(ways: FloatArray) -> None:
+    ways[0, FILLED] = ways[1, FILLED] = -1.0
+
+
+@part()
 def _edge(intervals: FloatArray, own: FloatArray, kept: FloatArray) -> None:
     """Take an edge, which is compared with others of its way."""
     if own[FILLED] >= 0.0:
-        intervals[:-1] = intervals[1:]
-        intervals[-1] = own[OWN_AGE]
+        push(intervals, own[OWN_AGE])
     own[FILLED] = min(own[FILLED] + 1.0, float(COUNT))
     own[OWN_AGE] = 0.0
     if own[FILLED] == COUNT and (_lone(intervals) or _jitter(intervals)):
         kept[AGO] = 0.0
 
 
-@njit()
+@part()
 def _jitter(intervals: FloatArray) -> bool:
     """Whether the intervals are those of a steady wave but for a sample more or less."""
-    if intervals.max() - intervals.min() > NEAR:
+    if _range(intervals, intervals.size) > NEAR:
         return False
     for length in range(1, intervals.size):
         least, most = np.inf, 0.0
         for first in range(intervals.size - length + 1):
-            total = intervals[first : first + length].sum()
+            total = 0.0
+            for i in range(first, first + length):
+                total += intervals[i]
             least, most = min(least, total), max(most, total)
         if most - least >= LATE:
             return True
     return False
 
 
-@njit()
+@part()
 def _lone(intervals: FloatArray) -> bool:
     """Whether the newest interval differs by a sample from all others, which are equal."""
-    others = intervals[:-1]
-    alike = others.max() == others.min()
-    return alike and abs(intervals[-1] - others[0]) == 1.0
+    newest = intervals.size - 1
+    return _range(intervals, newest) == 0.0 and abs(intervals[newest] - intervals[0]) == 1.0
+
+
+@part()
+def _range(intervals: FloatArray, count: int) -> float:
+    """Difference of the longest and the shortest of the first `count` intervals."""
+    least = most = intervals[0]
+    for i in range(1, count):
+        least, most = min(least, intervals[i]), max(most, intervals[i])
+    return most - least

@@ -14,13 +14,12 @@ curve fits if it is old; the curve gives what a moment later would have been rea
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from monitor.drives.reading_ages import Ages, assumptions, misfit
-from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes
+from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes, fill, push
 from rigwatch.wire.arrays import BoolArray, FloatArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 HALF = 4
 """Readings on either side of a window's middle."""
@@ -114,9 +113,10 @@ def _advance(  # noqa: PLR0917 -- a kernel
     window = np.zeros(size)
     for k in range(code.size):
         if code[k] == RESTART or code[k] == NEW_BOOT:
-            kept[:] = 0.0
+            fill(kept, 0.0)
             kept[AGO] = REMEMBERED
-            gains[:] = 0.0
+            fill(gains[0], 0.0)
+            fill(gains[1], 0.0)
         if code[k] == DEAD:
             continue
         head = int(kept[HEAD])
@@ -134,7 +134,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
         jitters[k] = kept[AGO] < REMEMBERED
 
 
-@njit()
+@part()
 def _in_force(ages: Ages, window: FloatArray, gains: FloatArray, kept: FloatArray) -> float:
     """The voltage in force in the middle of a window, which is the last to say its age."""
     now = window.size // 2 - 1
@@ -143,8 +143,8 @@ def _in_force(ages: Ages, window: FloatArray, gains: FloatArray, kept: FloatArra
         step = (window[i + 1] - window[i]) ** 2
         steps, largest = steps + step, max(largest, step)
     steps /= window.size - 1
-    gains[:, :-1] = gains[:, 1:]
-    gains[:, -1] = 0.0
+    push(gains[0], 0.0)
+    push(gains[1], 0.0)
     rough = misfit(ages.misfits[0], window)
     chosen = ages.old.shape[0] - 1
     in_turn = False
@@ -168,7 +168,7 @@ def _in_force(ages: Ages, window: FloatArray, gains: FloatArray, kept: FloatArra
     return total
 
 
-@njit()
+@part()
 def _weigh(ages: Ages, window: FloatArray, rough: float, gains: FloatArray) -> tuple[bool, int]:
     """Add what is gained if each reading from the middle on is old, where some assumption fits.
 
@@ -177,7 +177,9 @@ def _weigh(ages: Ages, window: FloatArray, rough: float, gains: FloatArray) -> t
         where steps slide; and the best one in which the middle reading is old.
     """
     now = window.size // 2 - 1
-    least = np.full((2, window.size), np.inf)
+    least = np.empty((2, window.size))
+    fill(least[0], np.inf)
+    fill(least[1], np.inf)
     once, chosen = np.inf, ages.old.shape[0] - 1
     for tried in range(ages.old.shape[0]):
         error = misfit(ages.misfits[tried], window)

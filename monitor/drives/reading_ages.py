@@ -6,10 +6,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import part
 
 DEGREE = 3
 """Of the polynomials that represent the smooth curve."""
@@ -48,7 +48,7 @@ def _shape(old: NDArray[np.int64], half: int) -> tuple[FloatArray, FloatArray]:
     return rotated[:, DEGREE + 1 :].T, weights[0]
 
 
-@njit()
+@part()
 def misfit(projection: FloatArray, window: FloatArray) -> float:
     """Energy of a window that no curve fits, under an assumption."""
     total = 0.0

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes
+from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes, fill
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kernel import kernel
 
@@ -78,7 +78,7 @@ def _advance(
     bands = times.size + 1
     for k in range(code.size):
         if code[k] == RESTART or code[k] == NEW_BOOT:
-            kept[:] = 0.0
+            fill(kept, 0.0)
         if code[k] != DEAD:
             left = signal[k]
             for band in range(bands):

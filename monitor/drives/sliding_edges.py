@@ -17,13 +17,12 @@ sum and centre: x·(1 + x)/2 at the sample before, and x·(1 - x)/2 at its own.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from monitor.drives.edges import LARGEST, LAST, SHORTEST, edge
-from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes
+from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes, fill, push
 from rigwatch.wire.arrays import BoolArray, FloatArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 UNIFORM = np.sqrt(3.0)
 """Ratio of the largest error to the standard deviation, if all errors up to it are as likely."""
@@ -116,17 +115,19 @@ def _advance(  # noqa: PLR0917 -- a kernel
     for k in range(code.size):
         if code[k] == RESTART or code[k] == NEW_BOOT:
             kept[LAST], kept[LARGEST], kept[FOLLOWS] = signal[k], 0.0, 0.0
-            delayed[:] = 0.0
+            fill(delayed[SAMPLE], 0.0)
+            fill(delayed[GAIN], 0.0)
             _forget(ways)
         if code[k] == DEAD:
             continue
         step = edge(signal[k], kept)
-        ways[:, AGE] += 1.0
-        delayed[:, :-1] = delayed[:, 1:]
-        delayed[SAMPLE, -1], delayed[GAIN, -1] = signal[k], kept[FOLLOWS]
+        ways[0, AGE] += 1.0
+        ways[1, AGE] += 1.0
+        push(delayed[SAMPLE], signal[k])
+        push(delayed[GAIN], kept[FOLLOWS])
         kept[FOLLOWS] = 0.0
         if step != 0.0:
-            if ways[:, AGE].min() < SHORTEST:
+            if min(ways[0, AGE], ways[1, AGE]) < SHORTEST:
                 _forget(ways)
             way = 1 if step > 0.0 else 0
             _edge(edges[way], ways[way])
@@ -138,41 +139,45 @@ def _advance(  # noqa: PLR0917 -- a kernel
         unsure[k] = max(_unsure(ways[0]), _unsure(ways[1])) if shows[k] else 0.0
 
 
-@njit()
+@part()
 def _forget(ways: FloatArray) -> None:
-    ways[:] = 0.0
+    fill(ways[0], 0.0)
+    fill(ways[1], 0.0)
 
 
-@njit()
+@part()
 def _known(ways: FloatArray) -> bool:
     """Whether the wave goes on and its edges of both ways are located."""
-    goes_on = ways[:, AGE] <= LONGEST * ways[:, INTERVAL]
-    return bool(np.all(goes_on & (ways[:, LOCATED] > 0.0)))
+    for way in range(2):
+        goes_on = ways[way, AGE] <= LONGEST * ways[way, INTERVAL]
+        if not goes_on or ways[way, LOCATED] <= 0.0:
+            return False
+    return True
 
 
-@njit()
+@part()
 def _follows(own: FloatArray) -> float:
     """Share of a step that the sample after it takes, so that the steps' centre is the edge's."""
     return 0.5 * own[EARLY] * (1.0 - own[EARLY])
 
 
-@njit()
+@part()
 def _unsure(own: FloatArray) -> float:
     """The largest error of the instant; what two steps leave is less than they differ by."""
     return UNIFORM * own[SPREAD] + _follows(own)
 
 
-@njit()
+@part()
 def _edge(edges: FloatArray, own: FloatArray) -> None:
     """Take an edge of one way, with those before it that lie on a line with it.
 
     The array holds the times since each, newest last.
     """
     if own[FILLED] > 0.0:
-        edges[:] += own[AGE]
+        for i in range(edges.size):
+            edges[i] += own[AGE]
         own[INTERVAL] = own[AGE]
-    edges[:-1] = edges[1:]
-    edges[-1] = 0.0
+    push(edges, 0.0)
     own[FILLED], own[AGE] = min(own[FILLED] + 1.0, float(COUNT)), 0.0
     while own[FILLED] >= LEAST:
         early, spread = _located(edges[COUNT - int(own[FILLED]) :])
@@ -185,7 +190,7 @@ def _edge(edges: FloatArray, own: FloatArray) -> None:
     own[LOCATED] = 0.0
 
 
-@njit()
+@part()
 def _located(ago: FloatArray) -> tuple[float, float]:
     """How long before its sample the newest edge is, with its spread; below 0 if there is no line.
 
@@ -214,7 +219,7 @@ def _located(ago: FloatArray) -> tuple[float, float]:
     return mean, np.sqrt(max(second / total - mean * mean, 0.0))
 
 
-@njit()
+@part()
 def _periods(ago: FloatArray) -> tuple[float, float]:
     """The shortest and the longest period of a line through the edges."""
     shortest, longest = 0.0, np.inf

@@ -17,13 +17,12 @@ to the next is
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from monitor.drives.reading_ages import DEGREE
-from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes
+from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes, fill
 from rigwatch.wire.arrays import BoolArray, FloatArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 CLEAR, FITS, USUALLY = 20.0, 0.1, 8.0
 """A step was skipped if the squared error without moved time is above the first multiple of the
@@ -122,7 +121,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
     size = ring.size
     for k in range(code.size):
         if code[k] == RESTART or code[k] == NEW_BOOT:
-            kept[:] = 0.0
+            fill(kept, 0.0)
         if code[k] == DEAD:
             continue
         head = int(kept[HEAD])
@@ -148,7 +147,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
             kept[SKIPS] = 0
 
 
-@njit()
+@part()
 def _skipped(misfits: FloatArray, ring: FloatArray, kept: FloatArray) -> int:
     """1 if the middle of the ring skips a step, -1 if it repeats one, else 0."""
     plain = _energy(misfits[0], ring, int(kept[HEAD]))
@@ -165,7 +164,7 @@ def _skipped(misfits: FloatArray, ring: FloatArray, kept: FloatArray) -> int:
     return way
 
 
-@njit()
+@part()
 def _energy(misfit: FloatArray, ring: FloatArray, head: int) -> float:
     total = 0.0
     for i in range(ring.size):
@@ -176,7 +175,7 @@ def _energy(misfit: FloatArray, ring: FloatArray, head: int) -> float:
     return total
 
 
-@njit()
+@part()
 def _share(kept: FloatArray) -> float:
     """f, from the time since the last skip and the interval between skips."""
     if kept[SKIPS] < SURE:
@@ -185,7 +184,7 @@ def _share(kept: FloatArray) -> float:
     return gone if kept[WAY] > 0.0 else 1.0 - gone
 
 
-@njit()
+@part()
 def _follow(way: int, kept: FloatArray) -> None:
     """Take a skip as the next of a regular clock, as a stray one, or as the first of another."""
     age, interval = kept[AGE], kept[INTERVAL]
@@ -204,7 +203,7 @@ def _follow(way: int, kept: FloatArray) -> None:
     kept[WAY], kept[STRAY], kept[AGE] = way, 0.0, 0.0
 
 
-@njit()
+@part()
 def _refined(age: float, interval: float) -> float:
     """The interval between skips after a regular one, 0 after another."""
     if _regular(age, interval):
@@ -215,12 +214,12 @@ def _refined(age: float, interval: float) -> float:
     return 0.0
 
 
-@njit()
+@part()
 def _parts(whole: float, part: float) -> float:
     return max(np.round(whole / part), 1.0)
 
 
-@njit()
+@part()
 def _regular(age: float, interval: float) -> bool:
     """Whether a time holds a whole number of intervals; a skip is told to a sample."""
     if interval <= 0.0:
@@ -229,7 +228,7 @@ def _regular(age: float, interval: float) -> bool:
     return abs(age - parts * interval) <= max(REGULAR * min(parts, 2.0) * interval, 1.0)
 
 
-@njit()
+@part()
 def _lost(kept: FloatArray) -> bool:
     """Whether too many skips are missing."""
     if kept[SKIPS] == 0.0:

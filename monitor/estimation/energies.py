@@ -6,10 +6,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from monitor.signals import fill
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import part
 
 HEAD, FILL, FRONT_LEFT = 0, 1, 2
 
@@ -33,15 +34,16 @@ def new_energies(length: int, signals: int) -> Energies:
     )
 
 
-@njit()
+@part()
 def restart_energies(energies: Energies) -> None:
     """Remove all samples."""
-    energies.place[:] = 0
-    energies.front[0, :] = 0.0
-    energies.back[:] = 0.0
+    place = energies.place
+    place[HEAD] = place[FILL] = place[FRONT_LEFT] = 0
+    fill(energies.front[0], 0.0)
+    fill(energies.back, 0.0)
 
 
-@njit(inline="always")
+@part(inline="always")
 def add(energies: Energies, signals: FloatArray) -> None:
     """Add the squares of one sample's signals and remove the oldest."""
     rows, front, back, place = energies
@@ -53,7 +55,7 @@ def add(energies: Energies, signals: FloatArray) -> None:
                 at = (head - 1 - n) % length
                 for i in range(width):
                     front[n + 1, i] = front[n, i] + rows[at, i]
-            back[:] = 0.0
+            fill(back, 0.0)
             place[FRONT_LEFT] = length
         place[FRONT_LEFT] -= 1
     else:
@@ -64,13 +66,13 @@ def add(energies: Energies, signals: FloatArray) -> None:
     place[HEAD] = head + 1 if head + 1 < length else 0
 
 
-@njit(inline="always")
+@part(inline="always")
 def energy(energies: Energies, signal: int) -> float:
     """Sum of squares of one signal over the window."""
     return energies.front[energies.place[FRONT_LEFT], signal] + energies.back[signal]
 
 
-@njit(inline="always")
+@part(inline="always")
 def recent_energy(energies: Energies, signal: int, count: int) -> float:
     """Sum of squares of the newest `count` samples."""
     length, at = energies.rows.shape[0], energies.place[HEAD]

@@ -16,10 +16,10 @@ time.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from monitor.signals import fill
 from rigwatch.wire.arrays import FloatArray, IntArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 HEAD, FILL, FRONT_LEFT, LENGTH = 0, 1, 2, 3
 
@@ -52,18 +52,18 @@ def new_window(length: int, parameters: int) -> Window:
     )
 
 
-@njit()
+@part()
 def restart_window(window: Window, length: int) -> None:
     """Remove all samples; the window then spans `length` samples, at most its capacity."""
     window.place[HEAD] = 0
     window.place[FILL] = 0
     window.place[FRONT_LEFT] = 0
     window.place[LENGTH] = length
-    window.front[0, :] = 0.0
-    window.back[:] = 0.0
+    fill(window.front[0], 0.0)
+    fill(window.back, 0.0)
 
 
-@njit(inline="always")
+@part(inline="always")
 def push(window: Window, row: FloatArray) -> None:
     """Add one row, and remove the oldest if the window is full."""
     rows, _, back, place = window
@@ -84,13 +84,13 @@ def push(window: Window, row: FloatArray) -> None:
     place[HEAD] = head + 1 if head + 1 < length else 0
 
 
-@njit()
+@part()
 def _refill(window: Window) -> None:
     """Move everything from `back` to `front`: suffix sums from the newest sample to the oldest."""
     rows, front, back, place = window
     width, length = rows.shape[1], place[LENGTH]
     newest = place[HEAD] - 1
-    front[0, :] = 0.0
+    fill(front[0], 0.0)
     for n in range(length):
         at = newest - n
         if at < 0:
@@ -100,11 +100,11 @@ def _refill(window: Window) -> None:
             for j in range(i, width):
                 front[n + 1, k] = front[n, k] + rows[at, i] * rows[at, j]
                 k += 1
-    back[:] = 0.0
+    fill(back, 0.0)
     place[FRONT_LEFT] = length
 
 
-@njit(inline="always")
+@part(inline="always")
 def sums(window: Window, out: FloatArray) -> None:
     """Sums of products over the window into `out`, shape (m,)."""
     _, front, back, place = window
@@ -112,7 +112,7 @@ def sums(window: Window, out: FloatArray) -> None:
         out[k] = front[place[FRONT_LEFT], k] + back[k]
 
 
-@njit()
+@part()
 def solve_two(s: FloatArray) -> tuple[float, float, float]:
     """(θ1, θ2, condition number of the normal matrix scaled to unit diagonal) from six sums.
 

@@ -14,10 +14,11 @@ now deviates.
 # mypy: disable-error-code="no-any-return"
 
 import numpy as np
-from numba import njit
 
 from monitor.observer.missing_force import DRY_UNIT, LATE_UNIT, E
+from monitor.signals import fill
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import part
 
 MOST = 1.25
 """Largest lateness [samples]: that of a held voltage, and what the response, which is that to later
@@ -66,18 +67,18 @@ time since it did, `RECENT` if never.
 def no_lateness() -> FloatArray:
     """The figures at the start."""
     kept = np.zeros(AGO + 1)
-    forget_lateness(kept)
+    kept[AGO] = RECENT
     return kept
 
 
-@njit()
+@part()
 def forget_lateness(kept: FloatArray) -> None:
     """Begin anew."""
-    kept[:] = 0.0
+    fill(kept, 0.0)
     kept[AGO] = RECENT
 
 
-@njit()
+@part()
 def follow_lateness(  # noqa: PLR0917 -- a kernel
     row: FloatArray, largest: float, judging: bool, learns: bool, anew: bool, kept: FloatArray
 ) -> None:
@@ -108,13 +109,13 @@ def follow_lateness(  # noqa: PLR0917 -- a kernel
     kept[AGO] = 0.0 if kept[FOR] >= SHOWN else min(kept[AGO] + 1.0, RECENT)
 
 
-@njit()
+@part()
 def _towards_none(known: float, found: float) -> float:
     """The known lateness, or less of it if less is found, as where an edge slides past a sample."""
     return min(max(found, 0.0), known) if known > 0.0 else max(min(found, 0.0), known)
 
 
-@njit()
+@part()
 def _learn(row: FloatArray, kept: FloatArray) -> None:
     for first, memory in ((OF_QUICK, QUICK), (OF_SLOW, SLOW)):
         _average(row[E] * row[E], first + ERRORS, memory, kept)
@@ -124,18 +125,18 @@ def _learn(row: FloatArray, kept: FloatArray) -> None:
         _average(row[DRY_UNIT] * row[DRY_UNIT], first + FRICTIONS, memory, kept)
 
 
-@njit()
+@part()
 def _average(value: float, place: int, memory: float, kept: FloatArray) -> None:
     kept[place] += (value - kept[place]) / memory
 
 
-@njit()
+@part()
 def is_late(kept: FloatArray) -> bool:
     """Whether there is or was a lateness, which may change."""
     return kept[AGO] < RECENT
 
 
-@njit()
+@part()
 def unsure_lateness(kept: FloatArray) -> float:
     """The lateness whose response is not accurate [samples]; of inputs that slide, half a sample.
 
@@ -144,7 +145,7 @@ def unsure_lateness(kept: FloatArray) -> float:
     return max(abs(kept[TAU]), HALF) if is_late(kept) else abs(kept[TAU])
 
 
-@njit()
+@part()
 def slides(kept: FloatArray) -> bool:
     """Whether a lateness has grown slowly: the edges of a clock that is almost the rate's.
 
@@ -157,7 +158,7 @@ def slides(kept: FloatArray) -> bool:
     return grown and explains and RATHER * left < _rubbing(kept, OF_QUICK)
 
 
-@njit()
+@part()
 def seems_to_grow(kept: FloatArray) -> bool:
     """Whether the newest samples show more of a lateness than those before, or dry friction.
 
@@ -171,13 +172,13 @@ def seems_to_grow(kept: FloatArray) -> bool:
     return more and most and late < RATHER * rubbed
 
 
-@njit()
+@part()
 def rubs(kept: FloatArray) -> bool:
     """Whether dry friction explains the newest samples better than any lateness does."""
     return _rubbing(kept, OF_QUICK) < _left(_best(kept, OF_QUICK), kept, OF_QUICK)
 
 
-@njit()
+@part()
 def lateness_changes(kept: FloatArray) -> bool:
     """Whether there is a lateness and the newest samples show another one than those before.
 
@@ -191,21 +192,21 @@ def lateness_changes(kept: FloatArray) -> bool:
     return some and not rubs(kept)
 
 
-@njit()
+@part()
 def _best(kept: FloatArray, first: int) -> float:
     """The lateness that explains most."""
     found = kept[first + PRODUCTS] / max(kept[first + RESPONSES], 1e-300)
     return min(max(found, -MOST), MOST)
 
 
-@njit()
+@part()
 def _left(tau: float, kept: FloatArray, first: int) -> float:
     """Mean square of the residual without a lateness."""
     explained = tau * (2.0 * kept[first + PRODUCTS] - tau * kept[first + RESPONSES])
     return kept[first + ERRORS] - explained
 
 
-@njit()
+@part()
 def _rubbing(kept: FloatArray, first: int) -> float:
     """Mean square of the residual without dry friction."""
     explained = max(kept[first + RUBBED], 0.0) ** 2 / max(kept[first + FRICTIONS], 1e-300)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from monitor.signals import DEAD, GOOD, NEW_BOOT, RESTART, Codes
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 DELAY, MATCHED, STEPPED = -1, -2, -3
 """Codes of columns that are only delayed, smoothed like one that is differentiated twice, or half
@@ -93,7 +93,7 @@ def motion_kernel(order: int, half_width: int, rate: float, late: float = 0.0) -
     )
 
 
-@kernel()
+@part()
 def _interpolate(ring: FloatArray, count: Codes) -> None:
     """Replace the held samples before the newest by the line between both ends of the gap."""
     width, held, newest = ring.shape[0], count[3], count[0] - 1

@@ -17,13 +17,12 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numba import njit
 
 from monitor.model import RemainderSection
 from monitor.observer.lagged_motion import EMPTY, FIRST
 from rigwatch.physics.transfer import filter_sample
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 COLUMNS = (
     "residual", "dry", "viscous", "predicted", "disagreement", "measured", "weak", "late", "moved",
@@ -134,7 +133,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
             out[k, c] = filter_sample(b, a, kept[c], value)
 
 
-@njit()
+@part()
 def _remainder(z: FloatArray, known: Polynomial, scaled: FloatArray) -> float:
     """w·φ(z)."""
     count = z.size
@@ -149,7 +148,7 @@ def _remainder(z: FloatArray, known: Polynomial, scaled: FloatArray) -> float:
     return total
 
 
-@kernel()
+@part()
 def _at_rest(row: FloatArray, kept: FloatArray, b: FloatArray) -> None:
     """Steady state of a high-pass for a constant row, in transposed direct form II."""
     for c in range(kept.shape[0]):

@@ -14,7 +14,6 @@ sensors agree with each other.
 # mypy: disable-error-code="no-any-return"
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from monitor.drives import corrected, edges_unsure, follow_edges, undecided
@@ -83,9 +82,9 @@ from monitor.observer.window_statistics import (
     rest,
     reversals,
 )
-from monitor.signals import Codes
+from monitor.signals import Codes, fill
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 (
     HEAD, FILLED, SINCE_START, QUIET, OUTSIDE, ONSET, DEPARTURE_AGO, AGREED, DISAGREED, CHANGED,
@@ -156,19 +155,19 @@ def decide(  # noqa: PLR0917 -- a kernel
         _one(k, inside[k], usual[:, k], response[k], rules, kept, out)
 
 
-@njit()
+@part()
 def _restart(kept: DecisionState) -> None:
     for place in range(kept.counts.size):
         kept.counts[place] = 0
     kept.counts[ONSET] = -1
     kept.counts[JUMP_AGO] = WAKE
-    kept.value[:] = 0.0
+    fill(kept.value, 0.0)
     kept.value[0] = UNNAMED
     forget_lateness(kept.lateness)
-    kept.edges[:] = 0.0
+    fill(kept.edges, 0.0)
 
 
-@njit()
+@part()
 def _follow_drive(energy: float, steady: bool, kept: DecisionState) -> None:
     """Detect a sudden start or increase of the drive; or it is known not to be steady."""
     late, before = kept.value[2], kept.value[3]
@@ -180,7 +179,7 @@ def _follow_drive(energy: float, steady: bool, kept: DecisionState) -> None:
     kept.value[2], kept.value[3] = late, before
 
 
-@njit()
+@part()
 def _follow_jumps(jumped: bool, kept: DecisionState) -> None:
     """Handle a jump: another fault while armed, otherwise settling starts again."""
     count = kept.counts
@@ -195,7 +194,7 @@ def _follow_jumps(jumped: bool, kept: DecisionState) -> None:
     kept.value[0] = OTHER
 
 
-@njit()
+@part()
 def _follow_inputs(
     kept: DecisionState, row: FloatArray, usual: FloatArray, rules: DecisionRules
 ) -> None:
@@ -225,7 +224,7 @@ def _follow_inputs(
         count[CHANGED] = 0
 
 
-@njit()
+@part()
 def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatArray) -> None:
     """Store a sample; the first columns are in the order of the residual's."""
     head = kept.counts[HEAD]
@@ -254,7 +253,7 @@ def friction_limit(usual: FloatArray, rules: DecisionRules) -> FloatArray:
     return np.where(np.isinf(usual), rules.friction * np.sqrt(rules.unseen), known)
 
 
-@njit()
+@part()
 def _energy_limit(largest: float, usual: float, rules: DecisionRules) -> float:
     """Energy at which the rig has departed, from the largest ever and at the present motion."""
     if np.isinf(usual):
@@ -262,14 +261,14 @@ def _energy_limit(largest: float, usual: float, rules: DecisionRules) -> float:
     return min(largest, usual * rules.lasting)
 
 
-@njit()
+@part()
 def _friction_limit(usual: float, rules: DecisionRules) -> float:
     if np.isinf(usual):
         return rules.friction * np.sqrt(rules.unseen)
     return min(rules.friction, usual * np.sqrt(rules.lasting))
 
 
-@njit()
+@part()
 def _one(  # noqa: PLR0917 -- a kernel
     k: int,
     inside: bool,
@@ -319,7 +318,7 @@ def _one(  # noqa: PLR0917 -- a kernel
     _follow(k, away, spread, rules, kept, out)
 
 
-@njit()
+@part()
 def _sure(deviation: float, kept: DecisionState) -> bool:
     """Whether a deviation is a departure at once.
 
@@ -330,7 +329,7 @@ def _sure(deviation: float, kept: DecisionState) -> bool:
     return deviation > SURE
 
 
-@njit()
+@part()
 def _variance(kept: DecisionState, rules: DecisionRules) -> float:
     """Healthy variance of the residual for the motion of the medium window."""
     n = min(MEDIUM, kept.counts[FILLED])
@@ -343,7 +342,7 @@ def _variance(kept: DecisionState, rules: DecisionRules) -> float:
     return total + mean_square(kept, LATENESS, MEDIUM)
 
 
-@njit()
+@part()
 def _mode(kept: DecisionState, rules: DecisionRules) -> float:
     """The mode: armed once everything has settled and is quiet, or after a maximum time."""
     count = kept.counts
@@ -361,7 +360,7 @@ def _mode(kept: DecisionState, rules: DecisionRules) -> float:
     return ARMING
 
 
-@njit()
+@part()
 def _follow(  # noqa: PLR0917 -- a kernel
     k: int,
     away: bool,
@@ -390,7 +389,7 @@ def _follow(  # noqa: PLR0917 -- a kernel
     out[NAMED_FORCE, k] = kept.value[1]
 
 
-@njit()
+@part()
 def _verdict(
     k: int, spread: float, rules: DecisionRules, kept: DecisionState, out: FloatArray
 ) -> float:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from monitor.observer.lagged_motion import EMPTY, FIRST
-from monitor.signals import Codes
+from monitor.signals import Codes, fill
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel
 
@@ -74,7 +74,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
         if state[k] == EMPTY:
             continue
         if state[k] == FIRST:
-            kept[:] = 0.0
+            fill(kept, 0.0)
             kept[1] = speed[k]
         kept[0] = leak * kept[0] + speed[k]
         change = speed[k] - kept[1]

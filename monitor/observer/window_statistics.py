@@ -4,7 +4,6 @@
 # mypy: disable-error-code="no-any-return"
 
 import numpy as np
-from numba import njit
 
 from monitor.observer.decision_state import (
     DRIVEN,
@@ -17,6 +16,7 @@ from monitor.observer.decision_state import (
     WET,
     DecisionState,
 )
+from rigwatch.wire.kernel import part
 
 HEAD, FILLED, WAS_JUDGING, LASTED = 0, 1, 12, 13
 """Indices of `decision_state.Counts` as constants for the kernel."""
@@ -26,7 +26,7 @@ RIDGE = 1e-3
 """Correlation of the viscous and the dry regressor above which they cannot be distinguished."""
 
 
-@njit()
+@part()
 def mean_square(kept: DecisionState, column: int, length: int) -> float:
     """Mean square of a column over the last samples."""
     n = min(length, kept.counts[FILLED])
@@ -36,7 +36,7 @@ def mean_square(kept: DecisionState, column: int, length: int) -> float:
     return total / max(n, 1)
 
 
-@njit()
+@part()
 def lasting_energy(kept: DecisionState, allowed: float) -> float:
     """Mean square of the residual over `LASTING` judged samples; 0 until there are as many.
 
@@ -51,10 +51,15 @@ def lasting_energy(kept: DecisionState, allowed: float) -> float:
     newest = kept.rows[(count[HEAD] - 1) % HISTORY, ERROR]
     kept.lasting[count[LASTED] % LASTING] = min(newest**2 / allowed, BURST)
     count[LASTED] += 1
-    return float(np.mean(kept.lasting)) if count[LASTED] >= LASTING else 0.0
+    if count[LASTED] < LASTING:
+        return 0.0
+    total = 0.0
+    for i in range(LASTING):
+        total += kept.lasting[i]
+    return total / LASTING
 
 
-@njit()
+@part()
 def _slides(kept: DecisionState, ago: int) -> bool:
     """Whether the motion has kept its direction long enough for real friction to change sign.
 
@@ -68,7 +73,7 @@ def _slides(kept: DecisionState, ago: int) -> bool:
     return True
 
 
-@njit()
+@part()
 def friction(
     kept: DecisionState, length: int, spread: float
 ) -> tuple[float, float, float, float, float]:
@@ -105,7 +110,7 @@ def friction(
     return force, viscous, deviations, explained / beyond, dry_alone / beyond
 
 
-@njit()
+@part()
 def dry_force(kept: DecisionState, surely: int, length: int) -> tuple[float, float]:
     """Force of dry friction alone [N], over a window and over the part of it in which it acts.
 
@@ -131,7 +136,7 @@ def dry_force(kept: DecisionState, surely: int, length: int) -> tuple[float, flo
     return p / a if a > 0.0 else 0.0, acting
 
 
-@njit()
+@part()
 def drive_explains(kept: DecisionState, length: int, spread: float) -> float:
     """Share of the residual beyond its healthy variance that a weaker drive explains.
 
@@ -152,7 +157,7 @@ def drive_explains(kept: DecisionState, length: int, spread: float) -> float:
     return p * p / (a * beyond) if p > 0.0 and a > 0.0 and yy > 0.0 else 0.0
 
 
-@njit()
+@part()
 def rest(kept: DecisionState, length: int, slow: float) -> float:
     """Share of the time at which the motion cannot be distinguished from rest."""
     n = min(length, kept.counts[FILLED])
@@ -162,7 +167,7 @@ def rest(kept: DecisionState, length: int, slow: float) -> float:
     return still / max(n, 1)
 
 
-@njit()
+@part()
 def reversals(kept: DecisionState, length: int, slow: float) -> int:
     """Number of reversals of the motion beyond noise."""
     n = min(length, kept.counts[FILLED])

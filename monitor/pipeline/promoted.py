@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from monitor.model import InertiaPlant, PromotedSection, RigModel
-from monitor.signals import DEAD, G1, G2, MODELLED, NEW_BOOT, RESTART, VELOCITY, Codes
+from monitor.signals import DEAD, G1, G2, MODELLED, NEW_BOOT, RESTART, VELOCITY, Codes, fill
 from rigwatch.physics.transfer import filter_sample
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
@@ -71,7 +71,7 @@ def _smoothed(  # noqa: PLR0917
 ) -> None:
     for k in range(code.size):
         if code[k] == RESTART or code[k] == NEW_BOOT:
-            state[:] = 0.0
+            fill(state, 0.0)
         if code[k] != DEAD:
             out[k] = filter_sample(b, a, state, math.tanh(data[k, VELOCITY] / smooth))
 

@@ -24,7 +24,7 @@ from monitor.reference import Reference, ReferenceRules
 from monitor.signals import Filters, SteadyAdmission, admit_steady, advance_filters
 from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
 from rigwatch.wire.kept_state import kept
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 CONDITIONS = len(JUDGED)
 COLUMNS = 7
@@ -112,7 +112,7 @@ def judge_steady(  # noqa: PLR0917
         )
 
 
-@kernel()
+@part()
 def _judge(  # noqa: PLR0917
     state: SteadyState,
     values: FloatArray,

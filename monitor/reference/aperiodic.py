@@ -7,7 +7,6 @@ that no stretch exceeds it.
 """
 
 import numpy as np
-from numba import njit
 
 from monitor.reference.reference_state import (
     APERIODIC,
@@ -15,7 +14,9 @@ from monitor.reference.reference_state import (
     Reference,
     ReferenceRules,
 )
+from monitor.signals import fill
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import part
 
 STRETCHES = 16
 """Number of stretches of `learn` samples that give the reference of an aperiodic excitation."""
@@ -23,7 +24,7 @@ APERIODIC_CYCLE = 256
 """Assumed cycle of the motion for an aperiodic drive [samples]."""
 
 
-@njit()
+@part()
 def learn_aperiodic(ref: Reference, rules: ReferenceRules, row: FloatArray) -> None:
     """Accumulate Σa², Σa·am, Σam², Σx² and ΣV² of each stretch; one sample per call."""
     stretch = ref.counts.learnt // rules.learn
@@ -38,7 +39,7 @@ def learn_aperiodic(ref: Reference, rules: ReferenceRules, row: FloatArray) -> N
         _arm_aperiodic(ref, rules.learn)
 
 
-@njit()
+@part()
 def _arm_aperiodic(ref: Reference, length: int) -> None:
     """Arm for an aperiodic drive; limits come from stretches of `length` samples."""
     total, learnt = np.zeros(4), ref.counts.learnt
@@ -56,7 +57,8 @@ def _arm_aperiodic(ref: Reference, length: int) -> None:
         largest = max(largest, (left - share * moved) / length)
     ref.levels.left_share = share
     ref.levels.quick = ref.levels.slow = scale**2 * mm / learnt
-    ref.template[:, :] = 0.0
+    for row in range(4):
+        fill(ref.template[row], 0.0)
     ref.levels.scale = scale
     ref.levels.noise = max(ref.levels.noise, np.sqrt(largest))
     ref.levels.swing = np.sqrt(ref.products[4] / learnt)
@@ -68,7 +70,7 @@ def _arm_aperiodic(ref: Reference, length: int) -> None:
     ref.counts.mode = ARMED
 
 
-@njit(inline="always")
+@part(inline="always")
 def follow_level(ref: Reference, modelled: float) -> None:
     """Update the level with one scaled modelled acceleration [m/s^2], for aperiodic drives."""
     ref.levels.quick += (modelled * modelled - ref.levels.quick) / 64.0

@@ -7,10 +7,9 @@ its samples come, it gets one.
 # Compiled functions are untyped to mypy.
 # mypy: disable-error-code="no-any-return"
 
-from numba import njit
-
 from monitor.reference.reference_state import Reference
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import part
 
 FEWEST_OF_A_PLACE = 2
 """Samples that make the average of a place."""
@@ -18,7 +17,7 @@ MOST_UNKNOWN = 8
 """Share of the places, as a divisor, that may lack an average when the reference is armed."""
 
 
-@njit()
+@part()
 def enough_known(ref: Reference) -> bool:
     """Whether so many places have an average that the reference can be armed."""
     unknown = 0
@@ -28,7 +27,7 @@ def enough_known(ref: Reference) -> bool:
     return unknown * MOST_UNKNOWN <= ref.counts.period
 
 
-@njit()
+@part()
 def average(ref: Reference) -> None:
     """Compute the averages; a place that was never seen lies on the line between the nearest."""
     period = ref.counts.period
@@ -41,7 +40,7 @@ def average(ref: Reference) -> None:
             _interpolate(ref, place, period)
 
 
-@njit()
+@part()
 def _interpolate(ref: Reference, place: int, period: int) -> None:
     before = after = 1
     while ref.seen[(place - before) % period] == 0:
@@ -55,13 +54,13 @@ def _interpolate(ref: Reference, place: int, period: int) -> None:
         ref.template[i, place] = (1.0 - share) * first + share * last
 
 
-@njit(inline="always")
+@part(inline="always")
 def is_known(ref: Reference, place: int) -> bool:
     """Whether this place has an average."""
     return ref.seen[place] >= FEWEST_OF_A_PLACE
 
 
-@njit()
+@part()
 def get_to_know(ref: Reference, place: int, row: FloatArray) -> None:
     """Add one clearly healthy sample of a place without an average."""
     ref.seen[place] += 1

@@ -21,7 +21,6 @@ An aperiodic excitation has no such average; see `aperiodic.py`.
 # mypy: disable-error-code="no-any-return"
 
 import numpy as np
-from numba import njit
 
 from monitor.reference.aperiodic import learn_aperiodic
 from monitor.reference.averages import FEWEST_OF_A_PLACE, average, enough_known
@@ -39,10 +38,12 @@ from monitor.reference.reference_state import (
     Reference,
     ReferenceRules,
 )
+from monitor.signals import fill
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import part
 
 
-@njit()
+@part()
 def restart(ref: Reference, new_boot: bool) -> None:
     """Settle again after a reset of the filters; discard the reference if its phase is lost."""
     ref.counts.since = 0
@@ -55,20 +56,20 @@ def restart(ref: Reference, new_boot: bool) -> None:
         ref.counts.source = NO_REFERENCE
 
 
-@njit(inline="always")
+@part(inline="always")
 def place_in_period(ref: Reference, seq: int) -> int:
     """φ of sample number `seq`."""
     return (seq - ref.counts.anchor) % ref.counts.period
 
 
-@njit(inline="always")
+@part(inline="always")
 def learnt_here(ref: Reference) -> int:
     """Number of samples of this run in the reference, 0 if it is from the model file."""
     own = ref.counts.source in (FROM_RUN, APERIODIC)
     return ref.counts.depth * ref.counts.period if own else 0
 
 
-@njit()
+@part()
 def observe(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> None:
     """Process one good sample (V, x, a, am) before the reference is armed; may arm it."""
     counts = ref.counts
@@ -87,7 +88,7 @@ def observe(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) ->
         _learn(ref, rules, seq, row)
 
 
-@njit()
+@part()
 def pass_over(ref: Reference) -> None:
     """Process one missing sample before the reference is armed, so that places keep their time."""
     _remember(ref, np.nan)
@@ -95,17 +96,34 @@ def pass_over(ref: Reference) -> None:
         ref.counts.learnt += 1
 
 
-@njit()
+@part()
 def _arm_fixed(ref: Reference, rules: ReferenceRules) -> None:
     """Arm without a healthy average: the residual is friction, with limits from the model file."""
-    ref.template[:, :] = 0.0
-    ref.seen[:] = FEWEST_OF_A_PLACE
+    for row in range(4):
+        fill(ref.template[row], 0.0)
+    _count_as_seen(ref, FEWEST_OF_A_PLACE)
     ref.counts.period, ref.counts.anchor, ref.counts.depth = 1, 0, LONGEST_AVERAGE
     ref.counts.source, ref.counts.mode = FIXED, ARMED
     ref.levels.scale, ref.levels.noise = 1.0, rules.residual_noise
 
 
-@njit()
+@part()
+def _count_as_seen(ref: Reference, times: int) -> None:
+    """Every place as if it had been seen so often."""
+    for place in range(ref.seen.size):
+        ref.seen[place] = times
+
+
+@part()
+def _forget_sums(ref: Reference) -> None:
+    """Begin to learn."""
+    for row in range(ref.sums.shape[0]):
+        fill(ref.sums[row], 0.0)
+    fill(ref.products, 0.0)
+    _count_as_seen(ref, 0)
+
+
+@part()
 def _remember(ref: Reference, voltage: float) -> None:
     size = ref.ring.size
     ref.ring[ref.counts.ring_head] = voltage
@@ -113,13 +131,13 @@ def _remember(ref: Reference, voltage: float) -> None:
     ref.counts.ring_fill = min(ref.counts.ring_fill + 1, size)
 
 
-@njit()
+@part()
 def _past(ref: Reference, ago: int) -> float:
     """Voltage `ago` samples before the newest."""
     return ref.ring[(ref.counts.ring_head - 1 - ago) % ref.ring.size]
 
 
-@njit()
+@part()
 def _swing(ref: Reference, count: int) -> float:
     mean, known = 0.0, 0
     for n in range(count):
@@ -134,7 +152,7 @@ def _swing(ref: Reference, count: int) -> float:
     return np.sqrt(square / max(known, 1))
 
 
-@njit()
+@part()
 def _look_for_period(ref: Reference, rules: ReferenceRules, seq: int) -> None:
     count = ref.counts.ring_fill
     swing = _swing(ref, count)
@@ -150,7 +168,7 @@ def _look_for_period(ref: Reference, rules: ReferenceRules, seq: int) -> None:
         ref.counts.source = APERIODIC
 
 
-@njit()
+@part()
 def _repeats(ref: Reference, period: int, count: int, tolerance: float) -> bool:
     """Whether the voltage repeats after `period`; stops at the first contradiction."""
     total = 0.0
@@ -163,7 +181,7 @@ def _repeats(ref: Reference, period: int, count: int, tolerance: float) -> bool:
     return True
 
 
-@njit()
+@part()
 def _found(ref: Reference, rules: ReferenceRules, seq: int, period: int, swing: float) -> None:
     counts, levels = ref.counts, ref.levels
     counts.period, counts.anchor = period, seq + 1
@@ -172,9 +190,7 @@ def _found(ref: Reference, rules: ReferenceRules, seq: int, period: int, swing: 
     levels.noise = rules.residual_noise
     levels.position_noise = rules.position_noise
     levels.voltage_noise = rules.voltage_noise
-    ref.sums[:, :] = 0.0
-    ref.seen[:] = 0
-    ref.products[:] = 0.0
+    _forget_sums(ref)
     counts.mode = LEARNING
     counts.source = FROM_RUN
     for index in range(ref.known_period.size):
@@ -185,7 +201,7 @@ def _found(ref: Reference, rules: ReferenceRules, seq: int, period: int, swing: 
                 return
 
 
-@njit()
+@part()
 def _turn(ref: Reference, index: int, period: int, swing: float) -> int:
     """Place of the newest voltage in the known period, -1 if it is another excitation."""
     best, best_turn = (0.02 * swing) ** 2 * period, -1
@@ -202,7 +218,7 @@ def _turn(ref: Reference, index: int, period: int, swing: float) -> int:
     return best_turn
 
 
-@njit()
+@part()
 def _take_known(ref: Reference, index: int, period: int, turn: int, seq: int) -> None:
     """Use the model file's reference without learning; a fault from the start is detected."""
     for row in range(4):
@@ -210,14 +226,14 @@ def _take_known(ref: Reference, index: int, period: int, turn: int, seq: int) ->
             ref.template[row, place] = ref.known[index, row, place]
     ref.counts.anchor = seq - turn
     ref.counts.depth = ref.known_depth[index]
-    ref.seen[:] = FEWEST_OF_A_PLACE
+    _count_as_seen(ref, FEWEST_OF_A_PLACE)
     ref.levels.scale = ref.known_scale[index]
     ref.counts.source = FROM_MODEL
     _measure_swings(ref)
     ref.counts.mode = ARMED
 
 
-@njit()
+@part()
 def _learn(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> None:
     counts, period = ref.counts, ref.counts.period
     if period == 1:
@@ -239,7 +255,7 @@ def _learn(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> 
         _finish_learning(ref, rules, wanted // period)
 
 
-@njit()
+@part()
 def _finish_learning(ref: Reference, rules: ReferenceRules, depth: int) -> None:
     """Compute averages, amplitude scale and scatter; restart if the rig has not settled."""
     counts, levels, period = ref.counts, ref.levels, ref.counts.period
@@ -251,20 +267,23 @@ def _finish_learning(ref: Reference, rules: ReferenceRules, depth: int) -> None:
     for place in range(period):
         count = ref.seen[place] - depth
         moreover += count + (1 if ref.seen[place] == 0 else 0)
-        signals = ref.template[:, place]
-        more[0] += count * signals[2] ** 2
-        more[1] += count * signals[2] * signals[3]
-        more[2] += count * signals[3] ** 2
-        more[3] += count * signals[1] ** 2
-        more[4] += count * signals[0] ** 2
-        aa += ref.template[2, place] ** 2
-        am += ref.template[2, place] * ref.template[3, place]
-        mm += ref.template[3, place] ** 2
-        xx += ref.template[1, place] ** 2
-        vv += ref.template[0, place] ** 2
+        v, x = ref.template[0, place], ref.template[1, place]
+        a, m = ref.template[2, place], ref.template[3, place]
+        more[0] += count * a**2
+        more[1] += count * a * m
+        more[2] += count * m**2
+        more[3] += count * x**2
+        more[4] += count * v**2
+        aa += a**2
+        am += a * m
+        mm += m**2
+        xx += x**2
+        vv += v**2
     scale = am / mm if mm > 0.0 else 0.0
     freedom = period * (depth - 1) + moreover
-    p = ref.products[:5] - more
+    p = more
+    for i in range(5):
+        p[i] = ref.products[i] - more[i]
     scatter = (p[0] - depth * aa) - 2.0 * scale * (p[1] - depth * am)
     scatter += scale**2 * (p[2] - depth * mm)
     noise = np.sqrt(max(scatter, 0.0) / freedom)
@@ -280,12 +299,10 @@ def _finish_learning(ref: Reference, rules: ReferenceRules, depth: int) -> None:
         counts.mode = ARMED
     else:
         counts.learnt = 0
-        ref.sums[:, :] = 0.0
-        ref.seen[:] = 0
-        ref.products[:] = 0.0
+        _forget_sums(ref)
 
 
-@njit()
+@part()
 def _measure_swings(ref: Reference) -> None:
     period = ref.counts.period
     ref.levels.swing = _periodic_rms(ref.template[0], period)
@@ -294,7 +311,7 @@ def _measure_swings(ref: Reference) -> None:
     ref.counts.cycle = period // _turns(ref)
 
 
-@njit()
+@part()
 def _periodic_rms(signal: FloatArray, period: int) -> float:
     """Root mean square of one period of a signal around its mean."""
     mean = 0.0
@@ -306,7 +323,7 @@ def _periodic_rms(signal: FloatArray, period: int) -> float:
     return np.sqrt(square)
 
 
-@njit()
+@part()
 def _turns(ref: Reference) -> int:
     """Number of cycles of the motion per period of the samples, at least one.
 
@@ -327,7 +344,7 @@ def _turns(ref: Reference) -> int:
     return max(turns, 1)
 
 
-@njit(inline="always")
+@part(inline="always")
 def refine(ref: Reference, place: int, row: FloatArray) -> None:
     """Add one clearly healthy sample to the average, until it is complete."""
     period = ref.counts.period

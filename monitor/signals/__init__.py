@@ -47,6 +47,7 @@ from monitor.signals.residual import (
     advance_filters,
     modelled_acceleration,
 )
+from monitor.signals.small_rows import copy, fill, push
 
 __all__ = [
     "ACCELERATION",
@@ -89,8 +90,11 @@ __all__ = [
     "below",
     "commission_inertia",
     "conditions",
+    "copy",
+    "fill",
     "level",
     "modelled_acceleration",
+    "push",
     "recorded",
     "usable",
 ]

@@ -23,9 +23,10 @@ import numpy as np
 
 from monitor.model import RigModel, TransferPlant
 from monitor.signals.admission import DEAD, GOOD, HELD, LARGEST, NEW_BOOT, RESTART, Codes
+from monitor.signals.small_rows import copy, fill
 from rigwatch.physics.transfer import TransferFunction, filter_sample, velocity_filter
 from rigwatch.wire.arrays import BoolArray, FloatArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 from rigwatch.wire.messages import ByteArray
 
 COLUMNS = ("voltage", "position", "acceleration", "modelled", "velocity", "g1", "g2")
@@ -126,26 +127,28 @@ def _states_of(functions: tuple[TransferFunction, ...], delay: int) -> _States:
     )
 
 
-@kernel()
+@part()
 def _clear(f: Filters) -> None:
-    f.now.plant[:] = 0.0
-    f.now.velocity[:] = 0.0
-    f.now.sign[:] = 0.0
-    f.now.speed[:] = 0.0
-    f.now.late[:] = 0.0
+    fill(f.now.plant, 0.0)
+    fill(f.now.velocity, 0.0)
+    fill(f.now.sign, 0.0)
+    fill(f.now.speed, 0.0)
+    for i in range(f.now.late.shape[0]):
+        fill(f.now.late[i], 0.0)
     f.missing[0] = 0
 
 
-@kernel()
+@part()
 def _copy(source: _States, to: _States) -> None:
-    to.plant[:] = source.plant
-    to.velocity[:] = source.velocity
-    to.sign[:] = source.sign
-    to.speed[:] = source.speed
-    to.late[:] = source.late
+    copy(source.plant, to.plant)
+    copy(source.velocity, to.velocity)
+    copy(source.sign, to.sign)
+    copy(source.speed, to.speed)
+    for i in range(source.late.shape[0]):
+        copy(source.late[i], to.late[i])
 
 
-@kernel()
+@part()
 def _within_limits(row: FloatArray) -> bool:
     for value in row:  # noqa: SIM110 (no generators in a compiled kernel)
         if not abs(value) <= LARGEST:  # also false for NaN
@@ -153,7 +156,7 @@ def _within_limits(row: FloatArray) -> bool:
     return True
 
 
-@kernel()
+@part()
 def _filter(readings: FloatArray, missing: bool, f: Filters, out: FloatArray) -> None:
     """One sample through all filters, to the stage's columns, shape (7,)."""
     state, late = f.now, f.now.late
@@ -173,7 +176,7 @@ def _filter(readings: FloatArray, missing: bool, f: Filters, out: FloatArray) ->
     out[6] = filter_sample(f.friction_b, f.friction_a, state.speed, speed)
 
 
-@kernel()
+@part()
 def _pass_gap(readings: FloatArray, usual: FloatArray, f: Filters) -> None:
     """Pass the missing samples again, now that `readings` after them are known."""
     count, unused, between = f.missing[0], np.zeros(7), np.zeros(3)
@@ -190,7 +193,7 @@ def _pass_gap(readings: FloatArray, usual: FloatArray, f: Filters) -> None:
     f.missing[0] = 0
 
 
-@kernel()
+@part()
 def _follow_gap(readings: FloatArray, held: bool, usual: FloatArray, f: Filters) -> None:
     """Keep what a gap needs, before its first sample and after its last one."""
     if held:
@@ -230,7 +233,7 @@ def advance_filters(  # noqa: PLR0917 -- a kernel
             code[k] = HELD
         if not _within_limits(out[k]):
             _clear(f)
-            out[k] = 0.0
+            fill(out[k], 0.0)
             code[k] = DEAD
             f.was_reset[0] = 1
             reset[k] = True

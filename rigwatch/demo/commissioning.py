@@ -45,7 +45,8 @@ def ensure_model(config: Path, folder: Path, say: Callable[[str], None]) -> Path
         say(f"model of the rig: {relative(model)}, made in an earlier run")
         return model
     say("commissioning: first the monitor learns how the healthy rig moves, as on a real rig:")
-    say("  three recordings and a model from them; nothing is shown in a browser before that")
+    say("  three recordings, and a model: a file that says how the healthy rig answers its drive")
+    say("  and how far it strays from that; nothing is shown in a browser before that")
     say(f"  {STEPS} commands run here by themselves, about a minute in all, more on a busy machine")
     say("  (later runs use the same model)")
     sessions = {role: folder / "commissioning" / f"{role}.mcap" for role in RECORDINGS}
@@ -59,7 +60,7 @@ def ensure_model(config: Path, folder: Path, say: Callable[[str], None]) -> Path
     say(f"  {STEPS - 1} of {STEPS}: making the model, {relative(model)}, from the recordings")
     _run(["commission", *roles, "--scheme", "transfer", "--output", model], say)
     # The trial also compiles the monitor's kernels, so that the live monitor starts quickly.
-    say(f"  {STEPS} of {STEPS}: trying the model on the recording with known friction")
+    say(f"  {STEPS} of {STEPS}: trying the model: the monitor runs over the last recording")
     _run(["replay", sessions["friction"], "--model", model], say)
     stamp.write_text(made_from, encoding="utf-8")
     return model

@@ -16,6 +16,7 @@ ACTS = {
     "actuator_gain": ("the valve's gain falls to {value:.0%}", "the valve's gain is whole again"),
 }
 NEUTRAL = {"coulomb": 0.0, "actuator_gain": 1.0}
+WHY_LATER = "later than the alarm: every known effect is compared with two seconds of samples"
 ENDED = ("normal", "cleared_unacknowledged")
 NAMELESS = "departure"
 """The alarm that reports a fault without naming it."""
@@ -128,6 +129,7 @@ class Narrator:
         if event.code == PROBABLY_MISSING:
             found = event.text.rpartition("probably missing: ")[2]
             self._say(f"            probably missing in the rig's model: {found}")
+            self._say(f"            ({WHY_LATER})")
             effect = re.search(r"(\w+)@\w", found)  # an effect at a port is written effect@port
             if effect:
                 self._say(f"            more about it: $ rigwatch effects {effect[1]}")

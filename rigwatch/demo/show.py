@@ -35,6 +35,13 @@ from sim_plant.scenario import load_scenario
 
 START_TIMEOUT = 180.0
 STOP_TIMEOUT = 60.0
+GO_ON = (
+    "on to your own machine (README.md, Your own machine):",
+    "  models, which are equations to be fitted:  rigwatch model list",
+    "  one of them beside your logs:              rigwatch study new NAME --data LOG --model MODEL",
+    "  a rig to be watched, from example files:   rigwatch init     (then docs/operations.md)",
+)
+"""What to do after the demonstration."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,4 +208,7 @@ class Show:
             self._say(f"demo: {complaint}")
         self._say(f"look into it:  rigwatch info {session}")
         self._say(f"replay it:     rigwatch replay {session}")
+        self._say("               (the same monitor over the recording; it finds the same)")
+        for line in GO_ON:
+            self._say(line)
         return Outcome(tuple(self._narrator.alarms), recording, tuple(found), code)

@@ -1,7 +1,13 @@
 """Compiled functions cached between runs and recompiled when anything in them changes.
 
+    Python ──▶ kernel ──▶ parts, which only kernels and other parts call
+
 numba's cache checks only the file in which a function is defined. Here the code and constants of
 other files that are compiled into the function are part of the cache key too.
+
+numba compiles a function anew for each constant that another one passes to it, and for every one a
+way in from Python, which for a state of many arrays takes as long as the function. A part has
+neither, and a kernel has one copy for all constants.
 """
 
 import hashlib
@@ -11,6 +17,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numba import njit
+from numba.core import types
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 
@@ -21,11 +28,36 @@ def kernel(**options: Any) -> Callable[[F], F]:
     """Decorator: compile with numba's `njit` and these options, and cache the result."""
 
     def compiled(function: F) -> F:
-        dispatcher = njit(**options)(function)
+        dispatcher = _compiled(function, options)
         dispatcher._cache = _KeyedByCode(function)  # type: ignore[no-untyped-call]
         return dispatcher  # type: ignore[no-any-return]
 
     return compiled
+
+
+def part(**options: Any) -> Callable[[F], F]:
+    """Decorator: compile with numba's `njit` and these options, for calls by kernels alone."""
+    # What is inlined is compiled on its own only if Python calls it.
+    options.setdefault("no_cpython_wrapper", options.get("inline") != "always")
+
+    def compiled(function: F) -> F:
+        return _compiled(function, options)  # type: ignore[no-any-return]
+
+    return compiled
+
+
+def _compiled(function: F, options: Mapping[str, Any]) -> Any:
+    """The function for kernels, which takes a constant for any value of its type."""
+    plain: Any = types.unliteral
+    dispatcher: Any = njit(**{"no_cfunc_wrapper": True, **options})(function)
+    original = dispatcher.get_call_template
+
+    def without_constants(arguments: Any, keywords: Any) -> Any:
+        named = {name: plain(kind) for name, kind in keywords.items()}
+        return original(tuple(map(plain, arguments)), named)
+
+    dispatcher.get_call_template = without_constants
+    return dispatcher
 
 
 class _KeyedByCode(FunctionCache):

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 from sim_plant.family.laws import Flow, Friction, Heat, Stage
 
 Record = Any
@@ -82,7 +82,7 @@ _STOP_STIFFNESS, _STOP_DAMPING = 5.0e4, 60.0
 _KARNOPP_SPEED, _KARNOPP_RATE = 1.5e-3, 1.0e3
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def share_of_choked(law: int, r: float, critical: float) -> float:
     """Flow at the pressure ratio `r` (down over up) as a share of the choked flow."""
     if law == ISO_6358:
@@ -131,7 +131,7 @@ def flow(  # noqa: PLR0917
     return amount if a > b else -amount
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def dry_friction(  # noqa: PLR0917
     law: int, level: float, v: float, z: float, net: float, p: Record
 ) -> float:
@@ -155,7 +155,7 @@ def dry_friction(  # noqa: PLR0917
     return level * z
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def bristle_rate(law: int, v: float, z: float, p: Record) -> float:
     """Rate of the bristle's share [1/s]: LuGre's with Stribeck's curve, else Dahl's."""
     reach = 1.0
@@ -164,7 +164,7 @@ def bristle_rate(law: int, v: float, z: float, p: Record) -> float:
     return (v - abs(v) * z / reach) / p.bristle
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def chamber_flows(y: Floats, p: Record, e: Record, time: float) -> tuple[float, float, float]:
     """Flows into chamber 1, into chamber 2 and across the piston, times R T0 [Pa m^3/s]."""
     factor = e.supply * (1.0 + e.ripple * math.sin(e.ripple_rate * time))
@@ -187,7 +187,7 @@ def chamber_flows(y: Floats, p: Record, e: Record, time: float) -> tuple[float, 
     return w1, w2, p.leak * (y[P1] - y[P2])
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def gas_rates(  # noqa: PLR0917
     pressure: float, temperature: float, volume: float, widening: float, w: float, p: Record
 ) -> tuple[float, float]:
@@ -205,7 +205,7 @@ def gas_rates(  # noqa: PLR0917
     return rate, temperature * (rate / pressure + widening / volume - filling)
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def other_forces(y: Floats, p: Record, e: Record) -> float:
     """All forces on the mass but dry friction [N]."""
     x, v = y[X], y[V]
@@ -254,7 +254,7 @@ def rates(  # noqa: PLR0917
     return y[AMPLIFIER]
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def valve_input(volts: float, before: float, step: float, p: Record, e: Record) -> float:
     """Voltage that moves the valve [V]: faults of the drive, play, limited rate, asymmetry."""
     u = min(max(e.valve_gain * volts, -e.saturation), e.saturation)
@@ -265,7 +265,7 @@ def valve_input(volts: float, before: float, step: float, p: Record, e: Record) 
     return before + min(max(u - before, -p.slew * step), p.slew * step)
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def runge_kutta(  # noqa: PLR0917
     y: Floats, work: Floats, u: float, time: float, h: float, p: Record, e: Record
 ) -> None:

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import part
 
 
-@kernel(inline="always")
+@part(inline="always")
 def slid(v: float, drive: float, dry: float, mass: float, h: float) -> float:
     """Speed after a step under a drive and dry friction; zero if friction holds the body.
 

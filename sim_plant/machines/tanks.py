@@ -10,7 +10,7 @@ Symbols: u voltage of the pump [V], h levels [m].
 import numpy as np
 
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 RATE = 1.0
 """Samples a second."""
@@ -32,12 +32,12 @@ EFFECTS = (
 """Names of the hidden effects, in the order of their strengths."""
 
 
-@kernel()
+@part()
 def _jet(level: float) -> float:
     return float(np.sqrt(2 * FALL * max(level, 0.0)))
 
 
-@kernel()
+@part()
 def _flows(v1: float, v2: float, flow: float, s: FloatArray) -> tuple[float, float]:
     upper, lower = v1 / GROUND[0], v2 / GROUND[1]
     between = HOLES[0] * _jet(upper)

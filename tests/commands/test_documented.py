@@ -92,3 +92,14 @@ def test_help_is_quick_because_nothing_slow_is_imported() -> None:
     )
     assert done.stderr.strip() == ""
     assert "COMMAND" in done.stdout
+
+
+def test_the_list_of_effects_loads_no_compiler_and_no_solver() -> None:
+    code = (
+        "import sys, rigwatch.commands as c\n"
+        "assert c.main(['effects', '--json']) == 0\n"
+        "print([m for m in ('numba', 'scipy') if m in sys.modules], file=sys.stderr)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout)["force"]
+    assert done.stderr.split() == ["[]"]

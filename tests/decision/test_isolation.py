@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
-from monitor.decision.isolation import Evidence, History, Rest, new_history, rest_of, store_sample
-from monitor.decision.isolation_verdict import Seen, slips
+from monitor.decision import isolation, isolation_verdict
+from monitor.decision.isolation import Evidence, History, Rest, new_history, store_sample
+from monitor.decision.isolation_verdict import Seen
+from tests.compiled import from_python
+
+rest_of = from_python(isolation.rest_of)
+slips = from_python(isolation_verdict.slips)
 
 NOISE = 1e-6
 """Standard deviation of the position [m]."""

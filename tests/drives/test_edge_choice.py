@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from monitor.drives import corrected, edges_unsure, follow_edges, no_edges, undecided
+from monitor.drives import edge_choice, no_edges
+from tests.compiled import from_python
+
+corrected = from_python(edge_choice.corrected)
+edges_unsure = from_python(edge_choice.edges_unsure)
+follow_edges = from_python(edge_choice.follow_edges)
+undecided = from_python(edge_choice.undecided)
 
 N, NOISE = 600, 0.1
 AT = np.arange(N)

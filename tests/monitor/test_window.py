@@ -5,8 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from monitor.estimation import window as windows
 from monitor.estimation.energies import add, energy, new_energies, recent_energy
-from monitor.estimation.window import new_window, push, solve_two, sums, windowed_least_squares
+from monitor.estimation.window import new_window, push, sums, windowed_least_squares
+from tests.compiled import from_python
+
+solve_two = from_python(windows.solve_two)
 
 
 def fresh(g: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -3,8 +3,12 @@
 import numpy as np
 import pytest
 
+from monitor.observer import window_statistics
 from monitor.observer.decision_state import AT, DRY, ERROR, HISTORY, SPEED, WET, new_state
-from monitor.observer.window_statistics import dry_force, friction
+from tests.compiled import from_python
+
+dry_force = from_python(window_statistics.dry_force)
+friction = from_python(window_statistics.friction)
 
 FORCE, LENGTH = 0.6, 64
 

@@ -3,19 +3,18 @@
 import numpy as np
 import pytest
 
-from monitor.observer.input_lateness import (
-    SLOW,
-    TAU,
-    follow_lateness,
-    is_late,
-    lateness_changes,
-    no_lateness,
-    rubs,
-    seems_to_grow,
-    slides,
-    unsure_lateness,
-)
+from monitor.observer import input_lateness
+from monitor.observer.input_lateness import SLOW, TAU, no_lateness
 from monitor.observer.missing_force import COLUMNS, DRY_UNIT, LATE_UNIT, E
+from tests.compiled import from_python
+
+follow_lateness = from_python(input_lateness.follow_lateness)
+is_late = from_python(input_lateness.is_late)
+lateness_changes = from_python(input_lateness.lateness_changes)
+rubs = from_python(input_lateness.rubs)
+seems_to_grow = from_python(input_lateness.seems_to_grow)
+slides = from_python(input_lateness.slides)
+unsure_lateness = from_python(input_lateness.unsure_lateness)
 
 N, NOISE = 1024, 0.1
 AT = 2.0 * np.pi * np.arange(N) / 32.0

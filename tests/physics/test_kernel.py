@@ -5,6 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+from numba import njit
+
+from rigwatch.wire.kernel import part
+
 CALLER = """
 import called as parts
 from called import FACTOR, scaled
@@ -18,15 +22,15 @@ print(result(1.0), sum(result.stats.cache_hits.values()))
 """
 CALLED = """
 import numpy as np
-from numba import njit
+from rigwatch.wire.kernel import part
 
 FACTOR, OFFSET, WEIGHTS = 2.0, 0.0, np.array([1.0, 2.0])
 
-@njit
+@part()
 def scaled(x):
     return deeper(x) * WEIGHTS[1]
 
-@njit
+@part()
 def deeper(x):
     return x + 1.0
 """
@@ -92,3 +96,19 @@ def test_a_cache_that_names_a_class_that_is_gone_is_written_anew(tmp_path: Path)
         if not caller.exists() or name not in caller.read_text():
             caller.write_text(USER.replace("Before", name))
         assert run(tmp_path) == ["1.0", hits]
+
+
+def test_a_part_is_compiled_once_for_all_constants() -> None:
+    @part()
+    def power(x: float, times: int) -> float:
+        found = 1.0
+        for _ in range(times):
+            found *= x
+        return found
+
+    @njit()
+    def total(x: float, most: int) -> float:
+        return power(x, 2) + power(x, times=3) + power(x, most)
+
+    assert total(2.0, 4) == 2.0**2 + 2.0**3 + 2.0**4
+    assert len(power.signatures) == 1

@@ -1,5 +1,6 @@
 """The parts of the demonstration: its configuration, its words, its verdict."""
 
+import re
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,9 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigwatch.demo.narrator import Narrator, acts
+from rigwatch.commands import every_command
+from rigwatch.demo.narrator import WHY_LATER, Narrator, acts
 from rigwatch.demo.own_folder import own_folder
 from rigwatch.demo.rig_file import write_rig_file
+from rigwatch.demo.show import GO_ON
 from rigwatch.demo.verdict import complaints, read_recording
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.messages import PROBABLY_MISSING
@@ -175,6 +178,7 @@ def test_what_is_missing_in_the_model_is_told_and_other_events_are_not() -> None
     narrator.explain(Event("daq", 0, "warning", "CLOCK STEP", "the clock stepped"))
     assert [line.strip() for line in said] == [
         f"probably missing in the rig's model: {found}",
+        f"({WHY_LATER})",
         "more about it: $ rigwatch effects coulomb",
     ]
     said.clear()
@@ -248,6 +252,12 @@ def test_a_wrong_name_no_alarm_and_no_estimates_are_complained_about(recorded: R
     assert any("no alarm named dry friction; alarms: other_fault" in line for line in found)
     assert any("not in the recording" in line for line in found)
     assert any("no estimates" in line for line in found)
+
+
+def test_what_it_says_to_go_on_with_are_commands() -> None:
+    said = [word for line in GO_ON for word in re.findall(r"rigwatch [a-z]+(?: [a-z]+)*", line)]
+    assert len(said) == 3
+    assert {name for name, _ in every_command()} >= set(said)
 
 
 def test_a_second_demonstration_takes_a_folder_of_its_own(

@@ -73,7 +73,7 @@ def bare_path(tmp_path: Path) -> Path:
     """A PATH with a shell's tools, and a Python that is too old."""
     folder = tmp_path / "bin"
     folder.mkdir()
-    for tool in ("sh", "dirname", "grep", "id", "env"):
+    for tool in ("sh", "dirname", "grep", "id", "env", "flock"):
         found = shutil.which(tool)
         assert found is not None
         (folder / tool).symlink_to(found)

@@ -23,13 +23,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """0 on success."""
+    if arguments.name is None:
+        return _list(arguments)
+    return _describe(arguments)
+
+
+def _describe(arguments: argparse.Namespace) -> int:
     from rigwatch.physics.engine.equations import library
     from rigwatch.wire.errors import ModelError, nearest
-    from rigwatch.workbench.catalogue import described, effect_curves
+    from rigwatch.workbench.catalogue import effect_curves
+    from rigwatch.workbench.effect_table import described
 
     name, known = arguments.name, library()
-    if name is None:
-        return _list(arguments)
     if name not in known:
         raise ModelError(f"effects: found {name!r}{nearest(name, known)}")
     check_folder(arguments.save)
@@ -42,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _list(arguments: argparse.Namespace) -> int:
-    from rigwatch.workbench.catalogue import KINDS, listed
+    from rigwatch.workbench.effect_table import KINDS, listed
 
     found = listed()
     lines: list[str] = []

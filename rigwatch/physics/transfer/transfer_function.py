@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ class Filter:
         return y
 
 
-@kernel()
+@part()
 def filter_sample(b: FloatArray, a: FloatArray, state: FloatArray, u: float) -> float:
     """One step of the filter; `b` and `a` of one length, `state` one shorter (at least one)."""
     y = b[0] * u + (state[0] if b.size > 1 else 0.0)

@@ -8,7 +8,7 @@ import numpy as np
 
 from rigwatch.physics.engine.compile import across, call, input_rows, lateness, place
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 
 @kernel(error_model="numpy")
@@ -41,7 +41,7 @@ def _add(dt: float, shares: FloatArray, ks: FloatArray, out: FloatArray) -> None
                     out[i, j] += weight * ks[stage, i, j]
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def _between(nominal: FloatArray, k: int, share: float, xs: FloatArray) -> None:
     """The nominal trajectory, interpolated linearly from sample k to the next."""
     for i in range(xs.size):

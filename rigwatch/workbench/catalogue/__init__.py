@@ -8,22 +8,17 @@ saved.
 from rigwatch.workbench.catalogue.drafts import Draft, draft_of_effects, draft_of_model
 from rigwatch.workbench.catalogue.drawings import plotted, text_plot
 from rigwatch.workbench.catalogue.effect_curves import Curve, effect_curves
-from rigwatch.workbench.catalogue.effect_table import KINDS, described, listed, markdown
 from rigwatch.workbench.catalogue.model_report import ModelReport, model_report
 from rigwatch.workbench.catalogue.problems import Problem
 
 __all__ = [
-    "KINDS",
     "Curve",
     "Draft",
     "ModelReport",
     "Problem",
-    "described",
     "draft_of_effects",
     "draft_of_model",
     "effect_curves",
-    "listed",
-    "markdown",
     "model_report",
     "plotted",
     "text_plot",

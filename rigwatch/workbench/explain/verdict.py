@@ -119,8 +119,9 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
     )
     word, text = _word(base, best, rivals, floor)
     ahead = None if trusted else _passed_over(best, accepted)
-    if word == "missing_effect" and (doubt := _doubt(base, best, ahead, rows, floor)):
-        word, rivals, text = doubt
+    if word == "missing_effect":
+        doubt = _doubt(base, best, ahead, rows, floor, trusted=trusted)
+        word, rivals, text = doubt or (word, rivals, text)
     if word == "undetermined" and ahead is not None and ahead.label not in (*members, *rivals):
         rivals = (*rivals, ahead.label)
     text += remaining_error(base, best, floor) + other_accepted(rows, (*members, *rivals))
@@ -128,19 +129,24 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
 
 
 def _doubt(
-    base: Fitted, best: Ranked, ahead: Ranked | None, rows: Sequence[Ranked], floor: NoiseFloor
+    base: Fitted,
+    best: Ranked,
+    ahead: Ranked | None,
+    rows: Sequence[Ranked],
+    floor: NoiseFloor,
+    *,
+    trusted: bool,
 ) -> tuple[Word, tuple[str, ...], str] | None:
     """Verdict, rivals and sentence if other recordings speak for other effects; otherwise None.
 
     Args:
         base, best, rows, floor: the model, the effect named, the ranking and the noise floor.
         ahead: the effect that was passed over for its parameters.
+        trusted: whether the effect named reaches the noise floor.
     """
-    assert best.fitted is not None
     leads = f"{best.label} lowers the held-out error most"
     if ahead is not None:
         leads += f" of those as simple ({ahead.label} lowers it further)"
-    trusted = floor.reached(best.fitted.held_out)
     if not trusted and (elsewhere := explaining_training(base, best, rows)):
         much = f"more than {CONTRADICTED:g} times as much of the training error"
         return "undetermined", elsewhere, f"{leads}, but {', '.join(elsewhere)} explains {much}"

@@ -19,7 +19,7 @@ from numba.extending import intrinsic
 
 from rigwatch.physics.engine.compile.step_size import ACCURATE, STABLE
 from rigwatch.wire.arrays import FloatArray, IntArray
-from rigwatch.wire.kernel import kernel
+from rigwatch.wire.kernel import kernel, part
 
 _DOUBLE = ir.DoubleType()
 TINY = 1e-200
@@ -55,7 +55,7 @@ call: Any = intrinsic(_call)
 """call(address, t, a, u, p, out, slopes): arrays are passed by their address."""
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def input_rows(u: FloatArray, count: int) -> FloatArray:
     """Rows for inputs, the time until held ones change, and the fastest rate of a memory."""
     rows = np.empty((count, u.shape[1] + 2))
@@ -63,7 +63,7 @@ def input_rows(u: FloatArray, count: int) -> FloatArray:
     return rows
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def place(  # noqa: PLR0917 -- a kernel
     u: FloatArray, row: int, at: float, inside: float, hold: FloatArray, rows: int, dt: float,
     us: FloatArray,
@@ -87,7 +87,7 @@ def place(  # noqa: PLR0917 -- a kernel
             us[j] += at * (u[row + 1, j] - u[row, j])
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def advance(  # noqa: PLR0917 -- a kernel
     step: int, u: FloatArray, row: int, start: float, end: float, hold: FloatArray, rows: int,
     dt: float, pp: int, z: FloatArray, us: FloatArray, times: FloatArray,
@@ -111,7 +111,7 @@ def advance(  # noqa: PLR0917 -- a kernel
     call(step, 0.0, z.ctypes.data, us.ctypes.data, pp, tp, tp)
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def lateness(hold: FloatArray) -> float:
     """Fraction of a sample after which held inputs change."""
     late = 0.0
@@ -120,7 +120,7 @@ def lateness(hold: FloatArray) -> float:
     return late
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def across(  # noqa: PLR0917 -- a kernel
     step: int, u: FloatArray, row: int, steps: int, late: float, hold: FloatArray, rows: int,
     dt: float, pp: int, z: FloatArray, us: FloatArray, times: FloatArray,
@@ -138,7 +138,7 @@ def across(  # noqa: PLR0917 -- a kernel
         advance(step, u, row, start, end, hold, rows, dt, pp, z, us, times)
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def renew(  # noqa: PLR0917 -- a kernel
     update: int, u: FloatArray, row: int, hold: FloatArray, rows: int, dt: float, pp: int,
     z: FloatArray, dz: FloatArray, us: FloatArray,
@@ -150,7 +150,7 @@ def renew(  # noqa: PLR0917 -- a kernel
         z[i] = dz[i]
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def forget(z: FloatArray) -> None:
     """Set what has decayed to zero: numbers too small to be normal are a hundred times slower."""
     for i in range(z.size):
@@ -158,7 +158,7 @@ def forget(z: FloatArray) -> None:
             z[i] = 0.0
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def restart(z: FloatArray, x0: FloatArray, w: int, m: int) -> None:
     """Initial states of window w; the sensitivity to the initial states is the identity."""
     n = x0.shape[1]
@@ -171,7 +171,7 @@ def restart(z: FloatArray, x0: FloatArray, w: int, m: int) -> None:
         z[n + i * m + m - n + i] = 1.0
 
 
-@kernel(error_model="numpy")
+@part(error_model="numpy")
 def needed(  # noqa: PLR0917 -- a kernel
     plain: int, pace: int, crossing: IntArray, u: FloatArray, row: int, hold: FloatArray,
     rows: int, dt: float, pp: int, z: FloatArray, dx: FloatArray, end: FloatArray,
