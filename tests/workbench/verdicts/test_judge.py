@@ -13,7 +13,7 @@ from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.explain.indistinguishable import undistinguished
 from rigwatch.workbench.explain.remaining_error import remaining_share
-from rigwatch.workbench.explain.sets.combinations import Combination
+from rigwatch.workbench.explain.sets.combination import Combination
 from rigwatch.workbench.explain.sets.several_effects import (
     _Member,
     _with_alternatives,
