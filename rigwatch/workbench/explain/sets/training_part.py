@@ -127,7 +127,7 @@ def _part(bench: Bench) -> TrainingPart | None:
 def _counts(recording: Recording, length: int, every: int) -> list[int]:
     """Number of windows of each recording."""
     ends = np.cumsum(recording.parts or (len(recording),)) // length
-    return np.diff(np.minimum(ends, every), prepend=0).tolist()
+    return [int(count) for count in np.diff(np.minimum(ends, every), prepend=0)]
 
 
 def _stretches(counts: list[int], factor: int) -> Iterator[tuple[int, int]]:
