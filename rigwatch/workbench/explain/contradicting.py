@@ -19,7 +19,7 @@ CONTRADICTED = 2.0
 FAVOURED = 1.25
 """The same where what is held out cannot tell the two apart, and the best leaves much of both."""
 HALF = 0.5
-"""Share of the training's energy above which one that explains more of it is a rival."""
+"""Share of the training's energy left above which one that explains more of it is a rival."""
 REFUTED = 5e-3
 """p-value of a rise of the held-out error below which it tells an effect from the best; eight
 blocks of one sign, the fewest of the test, reach it."""
@@ -73,13 +73,14 @@ def explaining_all(
 def favoured_by_training(
     base: Fitted, best: Ranked, rows: Sequence[Ranked], floor: NoiseFloor
 ) -> tuple[str, ...]:
-    """Labels of effects, no less simple, that explain more of the training than the best.
+    """Labels of effects that explain more of the training than the best.
 
     Asked where the best leaves much: what moves the held-out recordings is then also something
     else, which may favour a wrong effect there. Where it leaves half of the training, these are
-    accepted effects. Where it leaves a third of both errors they need not be, as the rest may raise
-    the error of the right effect, but must explain clearly more, and what is held out must not
-    speak for the best far beyond chance: many effects are compared.
+    accepted effects; one with more parameters must explain clearly more, as each further parameter
+    explains some. Where it leaves a third of both errors they need not be accepted, as the rest may
+    raise the error of the right effect, but must be as simple and explain clearly more, and what is
+    held out must not speak for the best far beyond chance: many effects are compared.
     """
     assert best.fitted is not None
     after = best.fitted
@@ -95,10 +96,10 @@ def favoured_by_training(
         fitted = row.fitted
         if fitted is None or fitted.train_error > (1 - MATERIAL) * base.train_error:
             return False
-        more = _explained(base, fitted)
-        if row.accepted and train > HALF and more > gain:
+        more, simple = _explained(base, fitted), row.free <= best.free
+        if row.accepted and train > HALF and more > (1.0 if simple else FAVOURED) * gain:
             return True
-        much = min(held_out, train) >= LITTLE and more > FAVOURED * gain
+        much = simple and min(held_out, train) >= LITTLE and more > FAVOURED * gain
         return much and difference(after.held_out, fitted.held_out).p_rises >= REFUTED
 
     return tuple(row.label for row in rows if _is_another(best, row) and favoured(row))
@@ -110,9 +111,9 @@ def _explained(base: Fitted, fitted: Fitted) -> float:
 
 
 def _is_another(best: Ranked, row: Ranked) -> bool:
-    """Whether it is an effect of other physics, no less simple than the best."""
-    alike = row is best or row.label in best.alike or same_family(best, row)
-    return not alike and row.free <= best.free
+    """Whether it is an effect of other physics, not the best in other words or in more detail."""
+    finer = row.port == best.port and row.placement.effect.refines == best.effect
+    return not (row is best or finer or row.label in best.alike or same_family(best, row))
 
 
 def energy_of_all(fitted: Fitted) -> float:

@@ -39,7 +39,7 @@ from rigwatch.workbench.explain.remaining_error import (
 )
 from rigwatch.workbench.explain.verdict_calibration import CLEAR, Evidence, probability_wrong
 from rigwatch.workbench.fit import Fitted
-from rigwatch.workbench.ranking import MATERIAL, Ranked
+from rigwatch.workbench.ranking import MATERIAL, NEAR, Ranked
 
 Word = Literal[
     "nothing_missing", "missing_effect", "undetermined", "unknown_effect", "model_inadequate"
@@ -205,16 +205,19 @@ def _margin(best: Ranked, rows: Sequence[Ranked], confused: tuple[str, ...]) -> 
 
 def _nothing_found(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
     ratio = floor.ratio(base.held_out)
+    text = f"the held-out error is {ratio:.2f} times the noise floor, and no effect lowers it"
     if floor.reached(base.held_out):
-        text = f"the held-out error is {ratio:.2f} times the noise floor, and no effect lowers it"
         return Verdict("nothing_missing", None, (), (), text)
+    noise = _like_noise(rows, floor)
+    # With effects in the model, a little above the least that the noise can be tells nothing.
+    if base.placements and noise and ratio < NEAR:
+        return Verdict("nothing_missing", None, (), (), text + noise)
     text = f"the held-out error is {ratio:.2f} times the noise floor, and no known effect lowers it"
     fitted = [row for row in rows if row.fitted is not None]
     if fitted:
         nearest = min(fitted, key=lambda row: row.held_out_error)
         text += f"; nearest is {nearest.label}, refused: {nearest.reason}"
-    text += _like_noise(rows, floor)
-    return Verdict("unknown_effect", None, (), (), text)
+    return Verdict("unknown_effect", None, (), (), text + noise)
 
 
 def _like_noise(rows: Sequence[Ranked], floor: NoiseFloor) -> str:

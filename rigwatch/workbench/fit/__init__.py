@@ -11,6 +11,7 @@ from rigwatch.workbench.fit.fitted_model import (
     nodes,
     placements_of,
     refit_from_short_horizons,
+    trained,
     values_with,
 )
 from rigwatch.workbench.fit.free_run import free_run
@@ -66,6 +67,7 @@ __all__ = [
     "profile",
     "refit_from_short_horizons",
     "shown",
+    "trained",
     "values",
     "values_with",
     "with_healthy_parameters",

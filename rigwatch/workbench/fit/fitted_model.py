@@ -181,6 +181,24 @@ def fit_model(
     return _judged(study, data, placements, found, horizon, initial, ended)
 
 
+def trained(
+    study: Study, data: Data, placement: Placement, start: Mapping[str, float], base: Fitted
+) -> Fitted:
+    """`fit_model` with a further effect, without a judgement: held out is what it was fitted to.
+
+    Args:
+        study, data, start: as in `fit_model`.
+        placement: the effect.
+        base: a fit with the other effects.
+
+    Raises:
+        ModelError: an effect does not fit its port, or the simulation diverged (NaN or infinite).
+    """
+    placements = (*base.placements, placement)
+    found, _, horizon = _trained(study, data, placements, start, base.train.scale, base)
+    return Fitted(placements, found, found, study.file.substeps, horizon)
+
+
 def values_with(
     study: Study,
     data: Data,

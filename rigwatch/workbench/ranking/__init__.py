@@ -8,6 +8,7 @@ are fitted (`refitting`) and judged by the held-out error (`acceptance`). `rank`
 from rigwatch.workbench.ranking.acceptance import (
     EXPLAINED,
     MATERIAL,
+    NEAR,
     STEP,
     judge_fit,
     left_over,
@@ -27,6 +28,7 @@ from rigwatch.workbench.ranking.refinements import (
 from rigwatch.workbench.ranking.refitting import (
     Progress,
     no_progress,
+    orders_at_port,
     own_floor,
     refit,
 )
@@ -38,6 +40,7 @@ __all__ = [
     "EXPLAINED",
     "MATERIAL",
     "MUCH_WORSE",
+    "NEAR",
     "SAME",
     "SIMILAR",
     "STEP",
@@ -51,6 +54,7 @@ __all__ = [
     "judge_fit",
     "left_over",
     "no_progress",
+    "orders_at_port",
     "own_floor",
     "promises_more",
     "rank",

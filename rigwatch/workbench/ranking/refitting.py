@@ -38,7 +38,7 @@ def refit(
         fitting: `fit_model` accepts the first minimum, `fit_with_retry` also searches elsewhere.
     """
     start, fits, failures = base.train.values() | row.begin(), list[Fitted](), list[str]()
-    for placement in _orders_at_port(base, row):
+    for placement in orders_at_port(base, row):
         placements = (*base.placements, placement)
         try:
             fits.append(fitting(study, data, placements, start, base.train.scale, base=base))
@@ -63,7 +63,7 @@ def fit_from(found: Fitted | None) -> Fitting:
     return fitting
 
 
-def _orders_at_port(base: Fitted, row: Ranked) -> list[Placement]:
+def orders_at_port(base: Fitted, row: Ranked) -> list[Placement]:
     """The effect placed after those at its port and, where order matters, before them.
 
     A drive that is delayed and then saturates differs from one that saturates first.

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rigwatch.workbench.explain.sets.combinations import Combination
+from rigwatch.workbench.explain.sets.combination import Combination
 from rigwatch.workbench.explain.sets.several_effects import _doubted
 from rigwatch.workbench.explain.verdict import judge
 from rigwatch.workbench.ranking import Ranked

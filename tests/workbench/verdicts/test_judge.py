@@ -13,7 +13,7 @@ from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.explain.indistinguishable import undistinguished
 from rigwatch.workbench.explain.remaining_error import remaining_share
-from rigwatch.workbench.explain.sets.combinations import Combination
+from rigwatch.workbench.explain.sets.combination import Combination
 from rigwatch.workbench.explain.sets.several_effects import (
     _Member,
     _with_alternatives,
@@ -136,6 +136,27 @@ def test_what_coloured_noise_may_be_is_said() -> None:
     assert "coloured" not in judge(base(2.0), rows, QUIET).text
 
 
+@pytest.mark.parametrize(
+    ("error", "p_value", "floor", "word"),
+    [
+        pytest.param(1.9, 0.4, QUIET, "nothing_missing", id="like noise"),
+        pytest.param(2.1, 0.4, QUIET, "unknown_effect", id="too much for it"),
+        pytest.param(1.9, 0.01, QUIET, "unknown_effect", id="like an effect"),
+        pytest.param(1.9, 0.4, PERIODS, "unknown_effect", id="the noise is known"),
+    ],
+)
+def test_after_an_effect_a_little_coloured_noise_is_not_told_as_something_missing(
+    error: float, p_value: float, floor: NoiseFloor, word: str
+) -> None:
+    refused = row("a@x", fitted=False)
+    refused.p_value = p_value
+    later = replace(base(error), placements=(refused.placement,))
+    found = judge(later, [refused], floor)
+    assert found.word == word
+    assert ("coloured noise" in found.text) == (floor is QUIET and p_value > 0.05)
+    assert judge(base(error), [refused], floor).word == "unknown_effect"
+
+
 def ended(converged: bool, undetermined: tuple[str, ...] = ()) -> Convergence:
     return Convergence(converged, 0.0, 1, 1, undetermined, (), "start", "stuck")
 
@@ -218,8 +239,8 @@ def trained(found: Ranked, error: float) -> Ranked:
 def test_an_effect_that_leads_on_the_recordings_held_out_alone_is_not_named(
     other: dict[str, Any], left: float, word: str
 ) -> None:
-    only = trained(best(error=left, family="drag", cosines={"b@x": 0.3}), 2.4)
-    rival = trained(row("b@x", left + 0.2, **other), 2.0)
+    only = trained(best(error=left, family="drag", cosines={"b@x": 0.3}), 2.1)
+    rival = trained(row("b@x", left + 0.2, **other), 1.5)
     found = judge(replace(base(), train=base(2.9).train), [only, rival], QUIET)
     assert found.word == word
     assert ("b@x explains more of all recordings together" in found.text) == (
@@ -237,14 +258,27 @@ def test_an_effect_that_leads_on_the_recordings_held_out_alone_is_not_named(
         pytest.param(1.6, 2.4, {"uneven": 2.5}, "missing_effect", id="little is left"),
         pytest.param(1.6, 2.5, {"uneven": 0.0, "accepted": True}, "undetermined", id="accepted"),
         pytest.param(1.2, 2.5, {"uneven": 0.0, "accepted": True}, "missing_effect", id="at noise"),
+        pytest.param(1.6, 2.4, {"accepted": True, "free": 3}, "undetermined", id="richer"),
+        pytest.param(
+            1.6, 2.55, {"accepted": True, "free": 3}, "missing_effect", id="hardly richer"
+        ),
+        pytest.param(
+            1.6,
+            2.4,
+            {"accepted": True, "free": 3, "refines": "coulomb"},
+            "missing_effect",
+            id="the same in more detail",
+        ),
     ],
 )
 def test_an_effect_that_leaves_much_gives_way_to_one_that_the_training_favours(
     held_out: float, training: float, other: dict[str, Any], word: str
 ) -> None:
     only = trained(best(error=held_out, cosines={"b@x": 0.3}), 2.6)
-    rival = row("b@x", accepted=other.get("accepted", False), free=other.get("free", 1))
-    error = (held_out + 0.4 * rival.accepted + 0.2) ** 2 + other["uneven"] * np.repeat(
+    named = "b@load" if "refines" in other else "b@x"
+    given = {name: other[name] for name in ("free", "refines") if name in other}
+    rival = row(named, accepted=other.get("accepted", False), **given)
+    error = (held_out + 0.4 * rival.accepted + 0.2) ** 2 + other.get("uneven", 0.0) * np.repeat(
         [1.0, -1.0, 1.0, -1.0], 10
     )
     rival.fitted = replace(leaving(error), train=base(training).train)

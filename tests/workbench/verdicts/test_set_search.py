@@ -9,12 +9,8 @@ import pytest
 
 from rigwatch.physics.engine.equations.system import Placement
 from rigwatch.workbench.compare import open_bench
-from rigwatch.workbench.explain.sets.combinations import (
-    Combination,
-    _best_in_training,
-    _substitutes,
-    with_rows,
-)
+from rigwatch.workbench.explain.sets.combination import Combination, best_in_training, with_rows
+from rigwatch.workbench.explain.sets.combinations import _substitutes
 from rigwatch.workbench.explain.sets.several_effects import _judge_each, _ranked_with
 from rigwatch.workbench.ranking import candidates, no_progress, rank, refit, scored
 from rigwatch.workbench.ranking.rank import _substitute_of_vague, _unfitted_similar
@@ -46,7 +42,7 @@ def test_of_effects_that_look_alike_at_one_port_the_better_is_extended(
     level: list[tuple[Ranked, ...]], extended: list[tuple[Ranked, ...]]
 ) -> None:
     sets = [Combination(rows, float(place)) for place, rows in enumerate(level)]
-    found = _best_in_training(list(reversed(sets)))
+    found = best_in_training(list(reversed(sets)))
     assert [each.rows for each in found] == extended
 
 

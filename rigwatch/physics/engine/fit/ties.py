@@ -51,14 +51,15 @@ def untied(  # noqa: PLR0917 -- those of `fit`
     names = found.compiled.system.free
     about = np.array([centre[name] for name in names])
     unit = _units(about, _values(found))
-    error = judged or _noise
-    allowed = error(found) * (1 + COSTS)
+    error, allowed = judged or _noise, 0.0
     for _ in range(ROUNDS):
         at = _values(found)
         size = np.maximum(unit * (about != 0), np.abs(at))
         flat = _flat(found, np.where(size > 0, size, 1.0))
         if not flat.shape[1]:
             break
+        # Without a tie the error, which may take a simulation, is not needed.
+        allowed = allowed or error(found) * (1 + COSTS)
         # Of all equivalent parameters, those nearest to the prior means.
         basis = np.linalg.qr(flat / unit[:, None]).Q
         prior = Prior(about, _noise(found) * basis.T / unit)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
-from rigwatch.workbench.explain.sets.combinations import with_rows
+from rigwatch.workbench.explain.sets.combination import with_rows
 from rigwatch.workbench.fit import Fitted
 from rigwatch.workbench.ranking import Ranked, judge_fit, rank_only, refit, shapes_of
 from rigwatch.workbench.study import told

@@ -15,15 +15,17 @@ from dataclasses import dataclass, replace
 
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.data import NoiseFloor
-from rigwatch.workbench.explain.sets.combinations import (
-    UNLIMITED,
+from rigwatch.workbench.explain.sets.combination import (
     Combination,
-    combinations,
     floor_of,
     not_worse,
     reaches_noise,
-    simplest_of_best,
     with_rows,
+)
+from rigwatch.workbench.explain.sets.combinations import (
+    UNLIMITED,
+    combinations,
+    simplest_of_best,
     without,
 )
 from rigwatch.workbench.explain.verdict import Verdict, judge

@@ -1,0 +1,132 @@
+"""Sets with another effect: scored, tried on a part of long recordings, fitted to the whole."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+from weakref import WeakKeyDictionary
+
+from rigwatch.physics.engine.compile import side_by_side
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.compare import Bench
+from rigwatch.workbench.explain.sets.combination import (
+    Combination,
+    best_in_training,
+    combination_of,
+    with_rows,
+)
+from rigwatch.workbench.explain.sets.training_part import Trial, part_of, tried
+from rigwatch.workbench.fit import Fitted, fit_model
+from rigwatch.workbench.ranking import MATERIAL, Ranked, candidates, refit, scored
+from rigwatch.workbench.study import Study
+
+_SCORED: WeakKeyDictionary[Fitted, list[Ranked]] = WeakKeyDictionary()
+"""Scores of all effects by the fit they were scored along; sets share the fits of their parts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Larger:
+    """A set with another effect, not fitted yet.
+
+    Attributes:
+        known: the set.
+        row: the effect.
+        trial: both fitted to a part of the training; None if that was not done.
+    """
+
+    known: Combination
+    row: Ranked
+    trial: Trial | None = None
+
+    @property
+    def labels(self) -> frozenset[str]:
+        """The effects, as "effect@port"."""
+        return self.known.labels | {self.row.label}
+
+    @property
+    def error(self) -> float:
+        """Error on the part of the training; 0 if it was not fitted to one."""
+        return self.trial.error if self.trial else 0.0
+
+
+def all_tried(bench: Bench, waiting: Sequence[tuple[Combination, Ranked]]) -> list[Larger]:
+    """Sets with another effect each, fitted to a part of the training if that is long.
+
+    Without those that cannot be fitted.
+    """
+    part = part_of(bench)
+    if part is None:
+        return [Larger(*each) for each in waiting]
+
+    def larger(each: tuple[Combination, Ranked]) -> Larger:
+        known, row = each
+        return Larger(
+            known, row, tried(with_rows(bench.study, known.rows), part, known.fitted, row)
+        )
+
+    return [each for each in side_by_side(larger, waiting) if each.trial]
+
+
+def most_promising(bench: Bench, waiting: Sequence[Larger]) -> list[Larger]:
+    """Those that leave least of a part of the training; all if they were not fitted to one."""
+    if part_of(bench) is None:
+        return list(waiting)
+    lower = [
+        each for each in waiting if each.error <= (1 - MATERIAL) * error_on_part(bench, each.known)
+    ]
+    # Of a set made in two ways, the better.
+    every = {each.labels: each for each in sorted(lower, key=lambda each: -each.error)}
+    sets = [Combination((*each.known.rows, each.row), each.error) for each in every.values()]
+    return [every[each.labels] for each in best_in_training(sets)]
+
+
+def error_on_part(bench: Bench, known: Combination) -> float:
+    """Error of a set on a part of the training; infinite if it is not known."""
+    part = part_of(bench)
+    try:
+        return part.error(known.fitted) if part else math.inf
+    except ModelError:
+        return math.inf
+
+
+def all_fitted(bench: Bench, larger: Sequence[Larger]) -> list[Combination]:
+    """Sets with another effect each, fitted side by side; without those that cannot be fitted."""
+    found = side_by_side(lambda each: _enlarged(bench, each), larger)
+    return [each for each in found if each is not None]
+
+
+def _enlarged(bench: Bench, larger: Larger) -> Combination | None:
+    """A set with another effect; None if it cannot be fitted."""
+    known, row, starts = larger.known, larger.row, larger.trial and larger.trial.starts
+
+    def fitting(study: Study, *args: Any, **more: Any) -> Fitted:
+        data, placements, start, scale = args
+        start = (starts or {}).get(placements[-1].ahead, start)
+        return fit_model(study, data, placements, start, scale, **more)
+
+    fit_with(bench, known.rows, known.fitted, row, fitting)
+    return None if row.fitted is None else combination_of(bench, (*known.rows, row))
+
+
+def scored_with(bench: Bench, known: Combination) -> list[Ranked]:
+    """All other effects, scored with a set in the model; computed once for each fit."""
+    if known.fitted not in _SCORED:
+        study, part = with_rows(bench.study, known.rows), part_of(bench)
+        found = candidates(study, bench.data.train)
+        if part is None:
+            _SCORED[known.fitted] = scored(study, bench.data, known.fitted, found)
+        else:
+            _SCORED[known.fitted] = scored(study, part.data, part.of(known.fitted), found)
+    # A fit and its reasons are stored in a row.
+    return [replace(row) for row in _SCORED[known.fitted]]
+
+
+def fit_with(
+    bench: Bench,
+    rows: Sequence[Ranked],
+    fitted: Fitted,
+    row: Ranked,
+    fitting: Callable[..., Fitted] = fit_model,
+) -> None:
+    """Fit an effect with others in the model, starting from their fit."""
+    refit(with_rows(bench.study, rows), bench.data, fitted, row, fitting)
