@@ -17,7 +17,7 @@ from rigwatch.physics.engine.fit import Fit
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench, find_base, open_bench
-from rigwatch.workbench.data import METHODS, from_residual
+from rigwatch.workbench.data import METHODS, NoiseFloor, from_residual
 from rigwatch.workbench.explain.verdict import Verdict, not_converged
 from rigwatch.workbench.ranking import Progress
 from rigwatch.workbench.study import Study, elements_of, varied
@@ -25,7 +25,9 @@ from rigwatch.workbench.study import Study, elements_of, varied
 MOST = 5.0
 """Largest ratio of the healthy recording's error to its noise at which a model is adequate."""
 ENOUGH = 2.0
-"""The same at which a search for a base ends: what is left is hardly a law that the base lacks."""
+"""The same at which the search for an adequate base ends."""
+CLOSE = 1.5
+"""The same above which a better base is looked for where repeated periods show the noise."""
 ADVICE = "try another model or other starting values, or record a healthy run that excites it more"
 VARIED = "`rigwatch study base {study} --take enough` searches for better variants of the model"
 
@@ -52,10 +54,9 @@ def inadequate(bench: Bench) -> Verdict | None:
 
     A rough model is compared with its own residual on a healthy recording and skips this check.
     """
-    healthy, bare, model = bench.data.of_healthy, bench.bare, bench.study.model
-    if healthy is None or bare is None or model.rough:
+    noise, bare, model = _healthy_noise(bench), bench.bare, bench.study.model
+    if noise is None or bare is None:
         return None
-    noise = from_residual(bare.train, healthy.train, bench.study.file.period, healthy.horizon)
     ratio = noise.ratio(bare.train)
     if ratio <= MOST:
         return None
@@ -65,6 +66,14 @@ def inadequate(bench: Bench) -> Verdict | None:
         f" {METHODS[noise.method]}), expected at most {MOST:g}: {ADVICE}"
     )
     return Verdict("model_inadequate", None, (), (), text)
+
+
+def _healthy_noise(bench: Bench) -> NoiseFloor | None:
+    """The noise of the healthy recording; None if there is none, or the model is a rough one."""
+    healthy, bare = bench.data.of_healthy, bench.bare
+    if healthy is None or bare is None or bench.study.model.rough:
+        return None
+    return from_residual(bare.train, healthy.train, bench.study.file.period, healthy.horizon)
 
 
 def stopped_by_outliers(bench: Bench, found: Verdict) -> Verdict:
@@ -150,29 +159,39 @@ def _worst(model: Model, ratios: FloatArray) -> str:
 
 
 def with_adequate_base(bench: Bench, progress: Progress) -> Bench:
-    """The bench, or one on a base that the healthy recordings ask for if its own is inadequate.
+    """The bench, or one on a base that the healthy recordings ask for.
+
+    One is looked for if the study's own is inadequate, or leaves more than the noise that repeated
+    periods show: a rig whose laws differ a little from the model's has effects on healthy days.
 
     Args:
         bench: of a study; one with accepted effects keeps its base.
         progress: called with a line of text as each fit begins.
     """
-    if not _is_inadequate(bench) or not _may_search(bench):
+    lacks = _is_inadequate(bench)
+    if not (lacks or _leaves_more_than_noise(bench)) or not _may_search(bench):
         return bench
-    progress("the model does not describe the healthy rig: searching for a better base")
+    told = "does not describe the healthy rig" if lacks else "leaves more than the healthy noise"
+    progress(f"the model {told}: searching for a better base")
     try:
-        better = _on_found_base(bench.study, progress)
+        better = _on_found_base(bench.study, ENOUGH if lacks else CLOSE, progress)
     except ModelError:
         return bench
     return bench if better is None or _is_inadequate(better) else better
 
 
-def _on_found_base(study: Study, progress: Progress) -> Bench | None:
+def _on_found_base(study: Study, enough: float, progress: Progress) -> Bench | None:
     """The bench on the best base found; None if that is the study's own.
+
+    Args:
+        study: the study.
+        enough: ratio of the error to its noise at which nothing more is looked for.
+        progress: called with a line of text as each fit begins.
 
     Raises:
         ModelError: a base cannot be fitted.
     """
-    found = find_base(study, progress, enough=ENOUGH)
+    found = find_base(study, progress, enough=enough)
     names = found.enough.variants
     if set(names) == set(study.file.variants):
         return None
@@ -198,6 +217,14 @@ def _may_search(bench: Bench) -> bool:
     return bool(bench.data.along_motion and study.file.healthy) and not (
         study.file.effects or study.model.rough
     )
+
+
+def _leaves_more_than_noise(bench: Bench) -> bool:
+    """Whether the healthy recording's error is above a noise that its repeated periods show."""
+    noise, bare = _healthy_noise(bench), bench.bare
+    if noise is None or bare is None or noise.method != "periods":
+        return False
+    return noise.ratio(bare.train) > CLOSE
 
 
 def _is_inadequate(bench: Bench) -> bool:

@@ -16,6 +16,8 @@ from tests.workbench.verdicts.test_refinements import MODEL, RATE, UNITS, Machin
 
 MIDDLE, HALF_WIDTH, SPEED = 0.004, 0.01, 60.0
 """Middle of spring and guide [m], half width of a dent [m], rate of the healthy motor [1/s]."""
+RAMP = 0.006
+"""Travel over which a tight part of the guide begins [m]."""
 
 
 class Hidden(NamedTuple):
@@ -26,7 +28,9 @@ class Hidden(NamedTuple):
         binding: friction by the distance from the middle [N/m].
         dry: friction [N].
         dent: friction at the dent's middle [N], which falls as a raised cosine.
-        place: of the dent [m].
+        tight: friction on a part of the travel [N], which begins in a straight ramp.
+        side: +1 if that part is above the place, -1 below, 0 on either side.
+        place: of the dent, or where the tight part begins [m].
         slower, weaker: shares by which the motor is.
     """
 
@@ -34,6 +38,8 @@ class Hidden(NamedTuple):
     binding: float = 0.0
     dry: float = 0.0
     dent: float = 0.0
+    tight: float = 0.0
+    side: float = 1.0
     place: float = 0.0
     slower: float = 0.0
     weaker: float = 0.0
@@ -45,6 +51,9 @@ def law(x: float, v: float, hidden: Hidden) -> float:
     near = min(abs(x - hidden.place) / HALF_WIDTH, 1.0)
     rubbing = hidden.binding * abs(x - MIDDLE) + hidden.dry
     rubbing += hidden.dent * 0.5 * (1.0 + np.cos(np.pi * near))
+    away = x - hidden.place
+    away = abs(away) if hidden.side == 0.0 else hidden.side * away
+    rubbing += hidden.tight * min(max(away / RAMP, 0.0), 1.0)
     return float(-hidden.cubic * (x - MIDDLE) ** 3 - rubbing * np.tanh(v / 1e-4))
 
 

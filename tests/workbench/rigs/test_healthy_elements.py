@@ -1,11 +1,16 @@
 """A base that lacks what the healthy machine has: the element is found, and a fault beside it."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from rigwatch.commands import main
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.explain.explain import explain
+from rigwatch.workbench.compare import open_bench
+from rigwatch.workbench.explain.adequacy import with_adequate_base
+from rigwatch.workbench.explain.explain import explain, explained
+from rigwatch.workbench.ranking import no_progress
 from rigwatch.workbench.study.elements import elements_of
 from rigwatch.workbench.study.study import Study, open_study
 from tests.workbench.fits.test_strength_intervals import MODEL, RATE, slide
@@ -28,10 +33,14 @@ def table(seed: int, friction: float) -> Table:
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
     """The study of a slide that rubs more than a healthy one; its model does not rub at all."""
-    folder = tmp_path_factory.mktemp("slide")
-    train, held_out = ([table(seed, HEALTHY + FAULT)] for seed in range(2))
+    return rubbing(tmp_path_factory.mktemp("slide"), HEALTHY)
+
+
+def rubbing(folder: Path, healthy: float) -> Study:
+    """The study of a slide that rubs by `FAULT` more than a healthy one [N]."""
+    train, held_out = ([table(seed, healthy + FAULT)] for seed in range(2))
     made = studied(folder, MODEL, train, held_out, UNITS, rates=[RATE] * 2)
-    recorded(folder / "healthy.mcap", table(2, HEALTHY), UNITS, RATE)
+    recorded(folder / "healthy.mcap", table(2, healthy), UNITS, RATE)
     with (made.folder / "study.toml").open("a") as file:
         file.write('\n[[healthy]]\nsession = "../healthy.mcap"\n')
     return open_study(made.folder)
@@ -49,6 +58,24 @@ def test_more_friction_is_named_beside_what_the_healthy_slide_has(study: Study) 
     (element,) = elements_of([told.split("with ")[1].split(",")[0]])
     assert element.values["Fc"] == pytest.approx(HEALTHY, rel=0.1)
     assert open_study(study.folder).file.variants == ()
+
+
+@pytest.mark.parametrize("healthy", [0.0, 0.012])
+def test_a_base_that_leaves_little_more_than_noise_is_bettered(
+    tmp_path: Path, healthy: float
+) -> None:
+    """The model has neither the slide's cubic spring nor its drive's saturation."""
+    study = rubbing(tmp_path, healthy)
+    own = open_bench(study)
+    assert own.bare is not None
+    better = with_adequate_base(own, no_progress)
+    assert better.bare is not None
+    assert better.bare.held_out_error < 0.8 * own.bare.held_out_error
+    found = explained(better).explanation
+    assert (found.verdict, found.ranking[0].effect) == ("missing_effect", "coulomb"), found.text
+    strength = found.ranking[0].parameters["Fc"]
+    assert strength.value == pytest.approx(FAULT, rel=0.15)
+    assert any(r.startswith("judged on the model with") for r in found.comparison.remarks)
 
 
 def test_an_element_is_taken_shown_and_undone(
