@@ -8,7 +8,7 @@ source is healthy.
 import math
 from dataclasses import dataclass, field
 
-from rigwatch.wire.host.heartbeat import WAITS
+from rigwatch.wire.host import WAITS
 
 
 @dataclass(frozen=True, slots=True)
