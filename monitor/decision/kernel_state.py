@@ -18,7 +18,7 @@ from monitor.estimation import (
     restart_window,
 )
 from monitor.reference import new_record
-from monitor.signals import fill
+from monitor.signals import fill, fill_rows
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import part
 
@@ -109,8 +109,7 @@ def clear(state: WatchState, window: int) -> None:
     """Reset to the initial state; the least squares then spans `window` samples."""
     restart_window(state.window, window)
     restart_energies(state.energies)
-    for row in range(state.history.rows.shape[0]):
-        fill(state.history.rows[row], 0.0)
+    fill_rows(state.history.rows, 0.0)
     counts = state.counts
     counts.episode = counts.quiet = counts.agreed = counts.hop = counts.excited = 0
     counts.still = 0

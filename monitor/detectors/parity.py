@@ -113,8 +113,7 @@ def _restart(state: ParityState) -> None:
     fill(state.input, 0.0)
     fill(state.point, 0.0)
     fill(state.threshold.memory, 0.0)
-    for place in range(state.counts.size):
-        state.counts[place] = 0
+    fill(state.counts, 0)
 
 
 @kernel()

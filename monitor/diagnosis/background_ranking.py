@@ -53,7 +53,6 @@ class Explainer:
         self._model, self._files = model, tuple(effect_files)
         self._judged: deque[Judged] = deque()
         self._wanted: Alarm | None = None
-        self._force = 0.0
         self._friction: tuple[int, int] | None = None
         self._told: dict[tuple[int, int], str] = {}
         self._results: queue.SimpleQueue[tuple[Alarm, Event, str]] = queue.SimpleQueue()
@@ -68,7 +67,6 @@ class Explainer:
         if self._judged and self._judged[-1][0].boot != block.boot:
             self._judged.clear()
         self._judged.append((_needed(block), samples))
-        self._force = _force(block)
         rate, alarm = self._model().sample_rate, self._wanted
         while self._judged[0][0].seq < block.seq - KEPT * rate:
             self._judged.popleft()
@@ -76,7 +74,7 @@ class Explainer:
             return
         if block.seq + len(block) - alarm.onset_seq >= WAIT * rate:
             self._wanted = None
-            force = self._force if self._friction == (alarm.boot, alarm.onset_seq) else 0.0
+            force = _force(block) if self._friction == (alarm.boot, alarm.onset_seq) else 0.0
             arguments = (list(self._judged), alarm, self._model(), force)
             self._thread = threading.Thread(target=self._rank, args=arguments, daemon=True)
             self._thread.start()

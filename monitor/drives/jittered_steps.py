@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from monitor.drives.reading_ages import Ages, assumptions, misfit
-from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes, fill, push
+from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes, fill, fill_rows, push
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kernel import kernel, part
 
@@ -115,8 +115,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
         if code[k] == RESTART or code[k] == NEW_BOOT:
             fill(kept, 0.0)
             kept[AGO] = REMEMBERED
-            fill(gains[0], 0.0)
-            fill(gains[1], 0.0)
+            fill_rows(gains, 0.0)
         if code[k] == DEAD:
             continue
         head = int(kept[HEAD])
@@ -178,8 +177,7 @@ def _weigh(ages: Ages, window: FloatArray, rough: float, gains: FloatArray) -> t
     """
     now = window.size // 2 - 1
     least = np.empty((2, window.size))
-    fill(least[0], np.inf)
-    fill(least[1], np.inf)
+    fill_rows(least, np.inf)
     once, chosen = np.inf, ages.old.shape[0] - 1
     for tried in range(ages.old.shape[0]):
         error = misfit(ages.misfits[tried], window)

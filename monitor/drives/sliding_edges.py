@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from monitor.drives.edges import LARGEST, LAST, SHORTEST, edge
-from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes, fill, push
+from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes, fill_rows, push
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kernel import kernel, part
 
@@ -115,8 +115,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
     for k in range(code.size):
         if code[k] == RESTART or code[k] == NEW_BOOT:
             kept[LAST], kept[LARGEST], kept[FOLLOWS] = signal[k], 0.0, 0.0
-            fill(delayed[SAMPLE], 0.0)
-            fill(delayed[GAIN], 0.0)
+            fill_rows(delayed, 0.0)
             _forget(ways)
         if code[k] == DEAD:
             continue
@@ -141,8 +140,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
 
 @part()
 def _forget(ways: FloatArray) -> None:
-    fill(ways[0], 0.0)
-    fill(ways[1], 0.0)
+    fill_rows(ways, 0.0)
 
 
 @part()

@@ -157,8 +157,7 @@ def decide(  # noqa: PLR0917 -- a kernel
 
 @part()
 def _restart(kept: DecisionState) -> None:
-    for place in range(kept.counts.size):
-        kept.counts[place] = 0
+    fill(kept.counts, 0)
     kept.counts[ONSET] = -1
     kept.counts[JUMP_AGO] = WAKE
     fill(kept.value, 0.0)

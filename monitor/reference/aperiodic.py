@@ -14,7 +14,7 @@ from monitor.reference.reference_state import (
     Reference,
     ReferenceRules,
 )
-from monitor.signals import fill
+from monitor.signals import fill_rows
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import part
 
@@ -57,8 +57,7 @@ def _arm_aperiodic(ref: Reference, length: int) -> None:
         largest = max(largest, (left - share * moved) / length)
     ref.levels.left_share = share
     ref.levels.quick = ref.levels.slow = scale**2 * mm / learnt
-    for row in range(4):
-        fill(ref.template[row], 0.0)
+    fill_rows(ref.template, 0.0)
     ref.levels.scale = scale
     ref.levels.noise = max(ref.levels.noise, np.sqrt(largest))
     ref.levels.swing = np.sqrt(ref.products[4] / learnt)

@@ -38,7 +38,7 @@ from monitor.reference.reference_state import (
     Reference,
     ReferenceRules,
 )
-from monitor.signals import fill
+from monitor.signals import fill, fill_rows
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import part
 
@@ -99,28 +99,19 @@ def pass_over(ref: Reference) -> None:
 @part()
 def _arm_fixed(ref: Reference, rules: ReferenceRules) -> None:
     """Arm without a healthy average: the residual is friction, with limits from the model file."""
-    for row in range(4):
-        fill(ref.template[row], 0.0)
-    _count_as_seen(ref, FEWEST_OF_A_PLACE)
+    fill_rows(ref.template, 0.0)
+    fill(ref.seen, FEWEST_OF_A_PLACE)
     ref.counts.period, ref.counts.anchor, ref.counts.depth = 1, 0, LONGEST_AVERAGE
     ref.counts.source, ref.counts.mode = FIXED, ARMED
     ref.levels.scale, ref.levels.noise = 1.0, rules.residual_noise
 
 
 @part()
-def _count_as_seen(ref: Reference, times: int) -> None:
-    """Every place as if it had been seen so often."""
-    for place in range(ref.seen.size):
-        ref.seen[place] = times
-
-
-@part()
 def _forget_sums(ref: Reference) -> None:
     """Begin to learn."""
-    for row in range(ref.sums.shape[0]):
-        fill(ref.sums[row], 0.0)
+    fill_rows(ref.sums, 0.0)
     fill(ref.products, 0.0)
-    _count_as_seen(ref, 0)
+    fill(ref.seen, 0)
 
 
 @part()
@@ -226,7 +217,7 @@ def _take_known(ref: Reference, index: int, period: int, turn: int, seq: int) ->
             ref.template[row, place] = ref.known[index, row, place]
     ref.counts.anchor = seq - turn
     ref.counts.depth = ref.known_depth[index]
-    _count_as_seen(ref, FEWEST_OF_A_PLACE)
+    fill(ref.seen, FEWEST_OF_A_PLACE)
     ref.levels.scale = ref.known_scale[index]
     ref.counts.source = FROM_MODEL
     _measure_swings(ref)

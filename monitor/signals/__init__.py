@@ -47,7 +47,7 @@ from monitor.signals.residual import (
     advance_filters,
     modelled_acceleration,
 )
-from monitor.signals.small_rows import copy, fill, push
+from monitor.signals.small_rows import copy, fill, fill_rows, push
 
 __all__ = [
     "ACCELERATION",
@@ -92,6 +92,7 @@ __all__ = [
     "conditions",
     "copy",
     "fill",
+    "fill_rows",
     "level",
     "modelled_acceleration",
     "push",

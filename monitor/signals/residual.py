@@ -23,7 +23,7 @@ import numpy as np
 
 from monitor.model import RigModel, TransferPlant
 from monitor.signals.admission import DEAD, GOOD, HELD, LARGEST, NEW_BOOT, RESTART, Codes
-from monitor.signals.small_rows import copy, fill
+from monitor.signals.small_rows import copy, fill, fill_rows
 from rigwatch.physics.transfer import TransferFunction, filter_sample, velocity_filter
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kernel import kernel, part
@@ -133,8 +133,7 @@ def _clear(f: Filters) -> None:
     fill(f.now.velocity, 0.0)
     fill(f.now.sign, 0.0)
     fill(f.now.speed, 0.0)
-    for i in range(f.now.late.shape[0]):
-        fill(f.now.late[i], 0.0)
+    fill_rows(f.now.late, 0.0)
     f.missing[0] = 0
 
 

@@ -3,15 +3,26 @@
 These are loops, as numba takes several times longer to compile assignments of whole slices.
 """
 
+from typing import Any
+
+from numpy.typing import NDArray
+
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import part
 
 
 @part()
-def fill(row: FloatArray, value: float) -> None:
-    """Set every entry of a row, shape (n,)."""
+def fill(row: NDArray[Any], value: float) -> None:
+    """Set every entry of a row, shape (n,), of numbers or counts."""
     for i in range(row.size):
         row[i] = value
+
+
+@part()
+def fill_rows(rows: FloatArray, value: float) -> None:
+    """Set every entry of several rows, shape (m, n)."""
+    for i in range(rows.shape[0]):
+        fill(rows[i], value)
 
 
 @part()

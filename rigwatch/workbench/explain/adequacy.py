@@ -54,13 +54,13 @@ def inadequate(bench: Bench) -> Verdict | None:
 
     A rough model is compared with its own residual on a healthy recording and skips this check.
     """
-    noise, bare, model = _healthy_noise(bench), bench.bare, bench.study.model
-    if noise is None or bare is None:
+    if (known := _on_healthy(bench)) is None:
         return None
-    ratio = noise.ratio(bare.train)
+    error, noise = known
+    ratio = noise.ratio(error)
     if ratio <= MOST:
         return None
-    channel = _worst(model, bare.train.rms / noise.rms)
+    channel = _worst(bench.study.model, error.rms / noise.rms)
     text = (
         f"the error on the healthy recording is {ratio:.3g} times its noise (worst: {channel};"
         f" {METHODS[noise.method]}), expected at most {MOST:g}: {ADVICE}"
@@ -68,12 +68,13 @@ def inadequate(bench: Bench) -> Verdict | None:
     return Verdict("model_inadequate", None, (), (), text)
 
 
-def _healthy_noise(bench: Bench) -> NoiseFloor | None:
-    """The noise of the healthy recording; None if there is none, or the model is a rough one."""
+def _on_healthy(bench: Bench) -> tuple[Fit, NoiseFloor] | None:
+    """The model's fit to the healthy recording, and its noise there; None if it is not checked."""
     healthy, bare = bench.data.of_healthy, bench.bare
     if healthy is None or bare is None or bench.study.model.rough:
         return None
-    return from_residual(bare.train, healthy.train, bench.study.file.period, healthy.horizon)
+    noise = from_residual(bare.train, healthy.train, bench.study.file.period, healthy.horizon)
+    return bare.train, noise
 
 
 def stopped_by_outliers(bench: Bench, found: Verdict) -> Verdict:
@@ -221,10 +222,10 @@ def _may_search(bench: Bench) -> bool:
 
 def _leaves_more_than_noise(bench: Bench) -> bool:
     """Whether the healthy recording's error is above a noise that its repeated periods show."""
-    noise, bare = _healthy_noise(bench), bench.bare
-    if noise is None or bare is None or noise.method != "periods":
+    if (known := _on_healthy(bench)) is None:
         return False
-    return noise.ratio(bare.train) > CLOSE
+    error, noise = known
+    return noise.method == "periods" and noise.ratio(error) > CLOSE
 
 
 def _is_inadequate(bench: Bench) -> bool:
