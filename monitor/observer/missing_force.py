@@ -103,7 +103,7 @@ class HighPassed:
         return out
 
 
-@kernel()
+@kernel(allocates=True)
 def _advance(  # noqa: PLR0917 -- a kernel
     columns: FloatArray,
     z: FloatArray,
