@@ -38,7 +38,7 @@ def _same_layout(first: Sequence[Column], second: Sequence[Column]) -> bool:
         return first.names == second.names
     if len(first) != len(second):
         return False
-    for a, b in zip(first, second, strict=True):  # noqa: SIM110 (a generator takes longer)
+    for a, b in zip(first, second, strict=True):
         if a.name != b.name or a.unit != b.unit or bool(a.quality.size) != bool(b.quality.size):
             return False
     return True
