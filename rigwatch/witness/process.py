@@ -124,11 +124,12 @@ class Witness:
     def _report(self, now: float, t_ns: int) -> None:
         silent = self._silence.age(now)
         stale = self._stale.holds
+        lost = self._commands.dropped + self._commands.rejected + self._commands.refused
         counters = {
             "estimates_silent_s": silent,
             "lost_alarms": float(self._alarms.lost),
             "commands_refused": float(self._check.refused),
-            "commands_lost": float(self._commands.dropped + self._commands.rejected),
+            "commands_lost": float(lost),
             **self._announcer.counters,
             **self._outputs.counters,
         }
