@@ -37,7 +37,21 @@ def parse(text: str, kind: type[S], file: Path | str) -> S:
     Raises:
         ConfigError: the text is not TOML or is not a valid `kind`.
     """
-    raw = tables(text, file)
+    return converted(tables(text, file), kind, file, text)
+
+
+def converted(raw: dict[str, Any], kind: type[S], file: Path | str, text: str = "") -> S:
+    """Plain values as a struct of class `kind`.
+
+    Args:
+        raw: the values by key.
+        kind: the class.
+        file: named in errors: where the values come from.
+        text: of the file, for the line of an error.
+
+    Raises:
+        ConfigError: they are not a valid `kind`.
+    """
     try:
         return msgspec.convert(raw, kind)
     except msgspec.ValidationError as error:
