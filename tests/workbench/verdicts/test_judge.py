@@ -566,6 +566,17 @@ def test_while_more_is_missing_a_little_less_is_no_reason_for_a_parameter(
     assert name_of(*rows) == named
 
 
+@pytest.mark.parametrize(("ratio", "named"), [(1.025, "dahl@x"), (1.04, "lugre@x")])
+def test_a_refinement_of_one_family_must_gain_as_much_as_an_effect(
+    ratio: float, named: str
+) -> None:
+    richer = best("lugre@x", error=2.0, free=3, family="friction")
+    simpler = row("dahl@x", 2.0 * ratio, jitter=0.001, free=2, family="friction")
+    assert name_of(richer, simpler) == named
+    other = row("dahl@x", 2.0 * ratio, jitter=0.001, free=2, family="drag")
+    assert name_of(richer, other) == "lugre@x"
+
+
 def test_a_little_less_is_a_reason_between_effects_of_as_many_parameters() -> None:
     assert name_of(row("a@x", 2.01, jitter=0.001), best("b@x", error=2.0)) == "b@x"
 
