@@ -219,6 +219,19 @@ def test_an_effect_that_leaves_most_is_not_the_answer() -> None:
     assert judge(base(3.0), [best(error=2.7)], QUIET).word == "unknown_effect"
 
 
+@pytest.mark.parametrize(
+    ("held_out", "train", "word"),
+    [(2.3, 2.3, "unknown_effect"), (2.3, 2.0, "missing_effect"), (2.0, 2.3, "missing_effect")],
+)
+def test_beside_an_accepted_effect_one_that_leaves_most_of_both_is_not_the_answer(
+    held_out: float, train: float, word: str
+) -> None:
+    only = trained(best(error=held_out), train)
+    assert judge(base(3.0), [only], QUIET).word == "missing_effect"
+    later = replace(base(3.0), placements=(row("a@x").placement,))
+    assert judge(later, [only], QUIET).word == word
+
+
 def trained(found: Ranked, error: float) -> Ranked:
     """An effect with another error in training than held out."""
     assert found.fitted is not None
