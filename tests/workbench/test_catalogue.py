@@ -54,6 +54,24 @@ def test_what_no_output_shows_and_nothing_uses_is_reported() -> None:
     assert found.start == ("x", "a", "b")
 
 
+def test_what_suits_a_port_is_counted_and_a_variable_that_no_effect_reads_is_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    speed = '= { expression = "v", unit = "m/s" }'
+    port = f'ports.hand = {{ kind = "force", unit = "N", variables.v {speed} }}\n'
+    text = UNSEEN.replace('"force/m"', '"(force + hand)/m"') + port
+    named = model_report(parse(text, Model, "hand"), {})
+    assert not named.unread
+    assert named.entering["hand"] > 20
+
+    file = tmp_path / "hand.toml"
+    file.write_text(text.replace("variables.v ", "variables.velocity "))
+    main(["model", "check", str(file)])
+    said = capsys.readouterr().out
+    assert "hand.velocity: no effect of the library uses a variable of this name" in said
+    assert "suit its ports: 2 at hand" in said
+
+
 def test_every_effect_is_drawn_and_does_something() -> None:
     for name, effect in library().items():
         curves = effect_curves(effect)

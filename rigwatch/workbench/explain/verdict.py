@@ -45,7 +45,8 @@ Word = Literal[
     "nothing_missing", "missing_effect", "undetermined", "unknown_effect", "model_inadequate"
 ]
 LITTLE_MORE = 0.01
-"""Relative difference of errors too small to justify a further parameter above the noise floor."""
+"""Relative difference of errors too small to justify a further parameter above the noise floor;
+within a family it is `MATERIAL`."""
 CHANCE = 0.05
 """p-value of the best effect from which coloured noise explains the error as well."""
 MOST_OF_IT = 0.75
@@ -292,10 +293,12 @@ def _simplest(row: Ranked) -> tuple[int, bool, float]:
 def _as_good(top: Ranked, row: Ranked, floor: NoiseFloor) -> bool:
     """Whether a row is as good as the one with the smallest held-out error.
 
-    Above the noise floor a slightly smaller error does not justify a further parameter.
+    Above the noise floor a slightly smaller error does not justify a further parameter. Within one
+    family that parameter refines the physics, and has to lower the error as much as an effect has.
     """
     assert top.fitted is not None
     if row is top or equal(top, row, 0.0):
         return True
-    little = row.held_out_error <= top.held_out_error * (1 + LITTLE_MORE)
+    margin = MATERIAL if same_family(top, row) else LITTLE_MORE
+    little = (1 - margin) * row.held_out_error <= top.held_out_error
     return row.free < top.free and little and not floor.reached(top.fitted.held_out)

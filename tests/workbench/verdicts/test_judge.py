@@ -219,6 +219,19 @@ def test_an_effect_that_leaves_most_is_not_the_answer() -> None:
     assert judge(base(3.0), [best(error=2.7)], QUIET).word == "unknown_effect"
 
 
+@pytest.mark.parametrize(
+    ("held_out", "train", "word"),
+    [(2.3, 2.3, "unknown_effect"), (2.3, 2.0, "missing_effect"), (2.0, 2.3, "missing_effect")],
+)
+def test_beside_an_accepted_effect_one_that_leaves_most_of_both_is_not_the_answer(
+    held_out: float, train: float, word: str
+) -> None:
+    only = trained(best(error=held_out), train)
+    assert judge(base(3.0), [only], QUIET).word == "missing_effect"
+    later = replace(base(3.0), placements=(row("a@x").placement,))
+    assert judge(later, [only], QUIET).word == word
+
+
 def trained(found: Ranked, error: float) -> Ranked:
     """An effect with another error in training than held out."""
     assert found.fitted is not None
@@ -564,6 +577,17 @@ def test_while_more_is_missing_a_little_less_is_no_reason_for_a_parameter(
 ) -> None:
     rows = best("b@x", error=level, free=2), row("a@x", level * ratio, jitter=0.001)
     assert name_of(*rows) == named
+
+
+@pytest.mark.parametrize(("ratio", "named"), [(1.025, "dahl@x"), (1.04, "lugre@x")])
+def test_a_refinement_of_one_family_must_gain_as_much_as_an_effect(
+    ratio: float, named: str
+) -> None:
+    richer = best("lugre@x", error=2.0, free=3, family="friction")
+    simpler = row("dahl@x", 2.0 * ratio, jitter=0.001, free=2, family="friction")
+    assert name_of(richer, simpler) == named
+    other = row("dahl@x", 2.0 * ratio, jitter=0.001, free=2, family="drag")
+    assert name_of(richer, other) == "lugre@x"
 
 
 def test_a_little_less_is_a_reason_between_effects_of_as_many_parameters() -> None:
