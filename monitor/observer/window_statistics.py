@@ -63,10 +63,15 @@ def lasting_energy(kept: DecisionState, allowed: float) -> float:
 def _slides(kept: DecisionState, ago: int) -> bool:
     """Whether the motion has kept its direction long enough for real friction to change sign.
 
-    Contacts deform before they slide, and sensors are delayed.
+    Contacts deform before they slide, and sensors are delayed. The other way round, strong friction
+    bends the speed where it reverses, and smoothing delays the reversal of a bent speed, so that
+    the force has changed sign in the sample before: neither counts one that the speed, going on as
+    it does, would be reversed after.
     """
     head = kept.counts[HEAD]
     speed = kept.rows[(head - ago) % HISTORY, SPEED]
+    if speed * (2.0 * speed - kept.rows[(head - ago - 1) % HISTORY, SPEED]) <= 0.0:
+        return False
     for before in range(1, RISING + 1):
         if speed * kept.rows[(head - ago - before) % HISTORY, SPEED] <= 0.0:
             return False

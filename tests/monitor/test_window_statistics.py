@@ -13,7 +13,7 @@ friction = from_python(window_statistics.friction)
 FORCE, LENGTH = 0.6, 64
 
 
-@pytest.mark.parametrize("late", [0, 1, 2])
+@pytest.mark.parametrize("late", [-1, 0, 1, 2])
 def test_force_does_not_fall_with_samples_in_which_friction_turns(late: int) -> None:
     at = np.arange(HISTORY)
     speed = np.sin(2.0 * np.pi * (at + 0.3) / 32.0)
