@@ -150,7 +150,7 @@ def dry_force(
     return p / a if a > 0.0 else 0.0, acting
 
 
-@part()
+@part(allocates=True)
 def _force_since(kept: DecisionState, start: int, high_pass: FloatArray) -> float:
     """Force of dry friction that begins with the sample `start` ago [N].
 
