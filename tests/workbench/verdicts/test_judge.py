@@ -220,6 +220,25 @@ def test_an_effect_that_leaves_most_is_not_the_answer() -> None:
 
 
 @pytest.mark.parametrize(
+    ("train", "like", "word"),
+    [
+        pytest.param(2.2, (), "undetermined", id="a third of the training remains"),
+        pytest.param(1.05, (), "missing_effect", id="nothing of it"),
+        pytest.param(2.2, ("b@x",), "undetermined", id="like it, but unlike held out"),
+    ],
+)
+def test_what_explains_the_held_out_alone_gives_way_to_what_explains_more_of_all(
+    train: float, like: tuple[str, ...], word: str
+) -> None:
+    """As a dead band of a pump beside outlets that follow another law than the model's."""
+    only = trained(best(error=1.3, alike=like, cosines={"b@x": 0.97}), train)
+    rival = trained(row("b@x", 2.2), 1.0)
+    found = judge(replace(base(6.0), train=base(3.4).train), [only, rival], QUIET)
+    assert found.word == word
+    assert found.rivals == (("b@x",) if word == "undetermined" else ())
+
+
+@pytest.mark.parametrize(
     ("held_out", "train", "word"),
     [(2.3, 2.3, "unknown_effect"), (2.3, 2.0, "missing_effect"), (2.0, 2.3, "missing_effect")],
 )
