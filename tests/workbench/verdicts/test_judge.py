@@ -17,6 +17,7 @@ from rigwatch.workbench.explain.sets.combination import Combination
 from rigwatch.workbench.explain.sets.several_effects import (
     _Member,
     _with_alternatives,
+    may_need_several,
     with_similar,
 )
 from rigwatch.workbench.explain.verdict import Verdict, judge, not_converged
@@ -236,6 +237,17 @@ def test_what_explains_the_held_out_alone_gives_way_to_what_explains_more_of_all
     found = judge(replace(base(6.0), train=base(3.4).train), [only, rival], QUIET)
     assert found.word == word
     assert found.rivals == (("b@x",) if word == "undetermined" else ())
+
+
+@pytest.mark.parametrize(("train", "several"), [(2.2, True), (1.05, False)])
+def test_sets_are_tried_where_an_effect_leaves_much_of_the_training_alone(
+    train: float, *, several: bool
+) -> None:
+    only = trained(best(error=1.3), train)
+    before = replace(base(6.0), train=base(3.4).train)
+    bench: Any = SimpleNamespace(base=before, floor=PERIODS, data=SimpleNamespace(of_healthy=None))
+    verdict = Verdict("missing_effect", only, (only.label,), (), "")
+    assert may_need_several(bench, verdict) is several
 
 
 @pytest.mark.parametrize(
