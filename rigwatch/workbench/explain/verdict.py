@@ -121,7 +121,7 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
     word, text = _word(base, best, rivals, floor)
     ahead = None if trusted else _passed_over(best, accepted)
     if word == "missing_effect":
-        doubt = _doubt(base, best, ahead, rows, floor, trusted=trusted)
+        doubt = _doubt(base, best, ahead, rows, floor, members=members, trusted=trusted)
         word, rivals, text = doubt or (word, rivals, text)
     if word == "undetermined" and ahead is not None and ahead.label not in (*members, *rivals):
         rivals = (*rivals, ahead.label)
@@ -136,6 +136,7 @@ def _doubt(
     rows: Sequence[Ranked],
     floor: NoiseFloor,
     *,
+    members: Sequence[str],
     trusted: bool,
 ) -> tuple[Word, tuple[str, ...], str] | None:
     """Verdict, rivals and sentence if other recordings speak for other effects; otherwise None.
@@ -143,6 +144,7 @@ def _doubt(
     Args:
         base, best, rows, floor: the model, the effect named, the ranking and the noise floor.
         ahead: the effect that was passed over for its parameters.
+        members: labels of the class of the effect named.
         trusted: whether the effect named reaches the noise floor.
     """
     leads = f"{best.label} lowers the held-out error most"
@@ -151,7 +153,7 @@ def _doubt(
     if not trusted and (elsewhere := explaining_training(base, best, rows)):
         much = f"more than {CONTRADICTED:g} times as much of the training error"
         return "undetermined", elsewhere, f"{leads}, but {', '.join(elsewhere)} explains {much}"
-    if better := explaining_all(base, best, rows, floor):
+    if better := explaining_all(base, best, members, rows, floor):
         more = "more of all recordings together"
         return "undetermined", better, f"{leads}, but {', '.join(better)} explains {more}"
     if hardly_trains(base, best, floor):
