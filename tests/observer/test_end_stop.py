@@ -28,7 +28,7 @@ def recorded(drive: np.ndarray, middle: float, stop: float) -> Recording:
 
 
 def tone() -> np.ndarray:
-    return np.sin(2.0 * np.pi * 4.0 * np.arange(round(SECONDS * RATE)) / RATE)
+    return np.asarray(np.sin(2.0 * np.pi * 4.0 * np.arange(round(SECONDS * RATE)) / RATE))
 
 
 def noise() -> np.ndarray:
