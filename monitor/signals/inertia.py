@@ -14,6 +14,7 @@ healthy average.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -135,40 +136,62 @@ def commission_inertia(
     if len(recordings) != 1 or recordings[0].role != "healthy":
         raise ModelError("commissioning an inertia: expected exactly one healthy recording")
     recording = recordings[0]
-    rate = recording.sample_rate
     force, speed, acceleration = smoothed(recording, half_width)
-    moving = np.abs(speed) > _LEAST_SPEED * np.max(np.abs(speed))
-    columns = np.column_stack([acceleration, np.sign(speed), speed, -np.ones(speed.size)])[moving]
-    if np.linalg.cond(columns / np.linalg.norm(columns, axis=0)) > 1e6:
-        raise ModelError(f"{recording.name}: found too little motion to tell mass from friction")
-    (mass, coulomb, viscous, offset), *_ = np.linalg.lstsq(columns, force[moving], rcond=None)
-    left = (force[moving] - columns @ np.array([mass, coulomb, viscous, offset])) / mass
-    if not (mass > 0.0 and coulomb > 0.0):
-        raise ModelError(
-            f"{recording.name}: found mass {mass:g} kg and friction {coulomb:g} N, "
-            "expected both above 0"
-        )
-    length = window or int(6 * rate)
-    spread = np.array(
-        [0.5 * coulomb, max(0.5 * abs(viscous), 0.5 * coulomb / np.max(np.abs(speed)))]
-    )
-    healthy = np.array([coulomb, viscous])
+    found = _balance(recording.name, force, speed, acceleration)
+    c, b = found.coulomb, found.viscous
+    spread = 0.5 * c, max(0.5 * abs(b), 0.5 * c / float(np.max(np.abs(speed))))
     return RigModel(
-        sample_rate=rate,
+        sample_rate=recording.sample_rate,
         channels=CHANNELS,
-        plant=InertiaPlant(mass=float(mass), offset=float(offset), half_width=half_width),
-        friction=FrictionSection(b=(1.0,), a=(1.0,), gamma=float(max(viscous / coulomb, 0.0))),
-        noise=NoiseSection(residual=float(np.std(left))),
-        window=WindowSection(length=length, hop=hop),
+        plant=InertiaPlant(mass=found.mass, offset=found.offset, half_width=half_width),
+        friction=FrictionSection(b=(1.0,), a=(1.0,), gamma=max(b / c, 0.0)),
+        noise=NoiseSection(residual=found.left),
+        window=WindowSection(length=window or int(6 * recording.sample_rate), hop=hop),
         decision=DecisionSection(
             settle=2 * half_width + 1, least_velocity=0.02 * float(np.std(speed))
         ),
-        band=BandSection(
-            low=(float((healthy - spread)[0]), float((healthy - spread)[1])),
-            high=(float((healthy + spread)[0]), float((healthy + spread)[1])),
-        ),
+        band=BandSection(low=(c - spread[0], b - spread[1]), high=(c + spread[0], b + spread[1])),
         recording=(RecordingSection(role="healthy", name=recording.name, sha256=recording.sha256),),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Balance:
+    """Forces on the mass, fitted where it moves.
+
+    Attributes:
+        mass: moving mass [kg].
+        coulomb: dry friction [N].
+        viscous: viscous friction [N s/m].
+        offset: of the force [N].
+        left: standard deviation of what remains [m/s^2].
+    """
+
+    mass: float
+    coulomb: float
+    viscous: float
+    offset: float
+    left: float
+
+
+def _balance(name: str, force: FloatArray, speed: FloatArray, acceleration: FloatArray) -> _Balance:
+    """The balance of the smoothed signals of the recording `name`, each of shape (n,).
+
+    Raises:
+        ModelError: it does not move enough, or mass or friction is not above 0.
+    """
+    moving = np.abs(speed) > _LEAST_SPEED * np.max(np.abs(speed))
+    columns = np.column_stack([acceleration, np.sign(speed), speed, -np.ones(speed.size)])[moving]
+    if np.linalg.cond(columns / np.linalg.norm(columns, axis=0)) > 1e6:
+        raise ModelError(f"{name}: found too little motion to tell mass from friction")
+    fitted, *_ = np.linalg.lstsq(columns, force[moving], rcond=None)
+    mass, coulomb, viscous, offset = fitted.tolist()
+    if not (mass > 0.0 and coulomb > 0.0):
+        raise ModelError(
+            f"{name}: found mass {mass:g} kg and friction {coulomb:g} N, expected both above 0"
+        )
+    left = float(np.std((force[moving] - columns @ fitted) / mass))
+    return _Balance(mass, coulomb, viscous, offset, left)
 
 
 def smoothed(recording: Recording, half_width: int) -> tuple[FloatArray, FloatArray, FloatArray]:

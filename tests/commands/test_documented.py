@@ -3,22 +3,26 @@
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from rigwatch.commands import every_command, main
+from rigwatch.commands import _parser, every_command, main
 from tools import config_docs
 
 COMMANDS = [name for name, _ in every_command()]
 ROOT = Path(__file__).parents[2]
 
 
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
 def pages() -> str:
-    found = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-    return "\n".join(page.read_text(encoding="utf-8") for page in found)
+    return "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -70,6 +74,39 @@ def test_a_sub_command_that_is_missing_or_unknown_is_refused(
     ):
         assert main(words) == 2
         assert capsys.readouterr().err.startswith(f"rigwatch: {told}")
+
+
+def shown_commands(page: Path) -> Iterator[tuple[int, list[str]]]:
+    """Line and words of each command in a block of code."""
+    fenced, before = False, ""
+    for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), start=1):
+        fenced ^= line.lstrip().startswith("```")
+        text, before = before + line.strip(), ""
+        if not (fenced or line.startswith("    ")) or not text.startswith("rigwatch "):
+            continue
+        if text.endswith("\\"):
+            before = text[:-1]
+            continue
+        for command in re.split(r"; (?=rigwatch )", text):
+            yield number, shlex.split(command.rstrip(" &"), comments=True)[1:]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_command_of_a_page_is_understood_as_it_is_printed(
+    page: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(ROOT)
+    for number, words in shown_commands(page):
+        try:
+            _parser(words).parse_args(words)
+        except SystemExit:
+            said = capsys.readouterr().err
+            # Files and folders are the reader's.
+            assert "found no such file" in said, f"{page.name}:{number}: {said}"
+
+
+def test_the_pages_show_commands() -> None:
+    assert sum(len(list(shown_commands(page))) for page in PAGES) > 100
 
 
 @pytest.mark.parametrize("name", COMMANDS)

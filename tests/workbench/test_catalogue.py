@@ -98,6 +98,11 @@ def test_all_effects_are_listed_once(capsys: pytest.CaptureFixture[str]) -> None
     assert all(f"  {name} " in said for name in library())
 
 
+def test_curves_of_all_effects_are_not_saved(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["effects", "--save", "all.svg"]) == 2
+    assert "--save: found no effect to draw" in capsys.readouterr().err
+
+
 def test_an_effect_is_described_and_saved(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

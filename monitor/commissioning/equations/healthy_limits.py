@@ -64,6 +64,20 @@ class HealthyPart:
         return np.column_stack([mean_over(level[skip:], MEDIUM) for level in self.levels.T])
 
 
+def _sensor_limits(parts: Sequence[HealthyPart], skip: int) -> tuple[float, float, float]:
+    """Noise of what two sensors disagree by, its growth with the motion, and the largest energy
+    over both.
+    """
+    gaps = [part.energies(DISAGREE, skip) for part in parts]
+    sizes = [part.energies(MEASURED, skip) for part in parts]
+    noise, growth = spread(np.concatenate(gaps), np.concatenate(sizes))
+    largest = max(
+        float(np.max(gap / (noise**2 + growth**2 * size)))
+        for gap, size in zip(gaps, sizes, strict=True)
+    )
+    return noise, growth, largest
+
+
 def healthy_limits(
     parts: Sequence[HealthyPart], speed_noise: float, skip: int, rate: float
 ) -> HealthyLimits:
@@ -77,13 +91,7 @@ def healthy_limits(
     """
     errors = [part.energies(E, skip) for part in parts]
     noise, growth = variance(errors, [part.grown(skip) for part in parts])
-    gaps = [part.energies(DISAGREE, skip) for part in parts]
-    sizes = [part.energies(MEASURED, skip) for part in parts]
-    sensor_noise, sensor_growth = spread(np.concatenate(gaps), np.concatenate(sizes))
-    sensor = max(
-        float(np.max(gap / (sensor_noise**2 + sensor_growth**2 * size)))
-        for gap, size in zip(gaps, sizes, strict=True)
-    )
+    sensor_noise, sensor_growth, sensor = _sensor_limits(parts, skip)
     rules = DecisionRules(
         noise, growth, 1.0, np.inf, 1.0, 1.0, 0.0, 1.0, speed_noise, NEVER, 1, 1.0
     )  # fmt: skip

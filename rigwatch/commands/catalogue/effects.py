@@ -5,6 +5,7 @@ from pathlib import Path
 
 from rigwatch.commands.catalogue.curves import plot_lines, save_curves
 from rigwatch.commands.common import check_folder, print_result
+from rigwatch.wire.errors import RigwatchError
 
 HELP = "list the effects of the library, or describe and draw one"
 EXAMPLE = """\
@@ -24,6 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0 on success."""
     if arguments.name is None:
+        if arguments.save:
+            raise RigwatchError("--save: found no effect to draw, expected its name")
         return _list(arguments)
     return _describe(arguments)
 

@@ -30,7 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
     target = arguments.folder / "configs"
     lines = (
         f"{target}: {len(copied)} files copied, {len(kept)} that were there already kept",
-        "  next: rigwatch demo, or rigwatch study new STUDY --template emps",
+        "  next: rigwatch demo, or rigwatch study new STUDY --data LOG --model MODEL",
     )
     print_result(arguments, {"copied": copied, "kept": kept}, lines)
     return 0

@@ -1,9 +1,14 @@
 """`rigwatch study show`: a study's model and its ledger."""
 
 import argparse
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from rigwatch.commands.common import print_json
+
+if TYPE_CHECKING:
+    from rigwatch.workbench.study import Study
 
 HELP = "show the model of a study, its effects and every step so far"
 EXAMPLE = "  rigwatch study show emps"
@@ -16,8 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """0 on success."""
-    from rigwatch.workbench.report import number, table
-    from rigwatch.workbench.study import ledger, open_study, physics_of
+    from rigwatch.workbench.study import ledger, open_study
 
     study = open_study(arguments.study)
     steps = list(ledger.lines(study))
@@ -31,15 +35,29 @@ def run(arguments: argparse.Namespace) -> int:
             }
         )
         return 0
-    print(f"{study.folder}: model {study.model.name}: {study.model.summary}")
-    for name in study.file.variants:
-        print(f"  with {name}: {physics_of(study, name)}")
-    for one in study.known:
-        print(f"  known of {one}")
+    print("\n".join([*_model_lines(study), *_step_lines(steps)]))
+    return 0
+
+
+def _model_lines(study: "Study") -> list[str]:
+    """The model with its variants, known and moving parameters and accepted effects."""
+    from rigwatch.workbench.study import physics_of
+
+    lines = [f"{study.folder}: model {study.model.name}: {study.model.summary}"]
+    lines += [f"  with {name}: {physics_of(study, name)}" for name in study.file.variants]
+    lines += [f"  known of {one}" for one in study.known]
     if moving := study.moving():
-        print(f"  fitted per recording: {', '.join(moving)}")
+        lines.append(f"  fitted per recording: {', '.join(moving)}")
     for accepted in study.file.effects:
-        print(f"  + {accepted.effect}@{accepted.port}: {study.effects[accepted.effect].physics}")
+        physics = study.effects[accepted.effect].physics
+        lines.append(f"  + {accepted.effect}@{accepted.port}: {physics}")
+    return lines
+
+
+def _step_lines(steps: "Sequence[Mapping[str, Any]]") -> list[str]:
+    """A table of the ledger."""
+    from rigwatch.workbench.report import number, table
+
     rows = [
         [
             line["time"],
@@ -51,5 +69,4 @@ def run(arguments: argparse.Namespace) -> int:
         ]
         for line in steps
     ]
-    print("\n".join(table(["time", "step", "effect", "training", "held out", "unit"], rows)))
-    return 0
+    return table(["time", "step", "effect", "training", "held out", "unit"], rows)

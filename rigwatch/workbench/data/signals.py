@@ -92,20 +92,7 @@ def prepare(study: Study) -> Data:
             samples are missing.
     """
     file, remarks = study.file, list[str]()
-    tables = {
-        use: [with_derived(read_columns(study.folder, span), file.derive) for span in spans]
-        for use, spans in (
-            ("train", file.train),
-            ("held_out", file.held_out),
-            ("healthy", file.healthy),
-        )
-    }
-    if any_same(tables["held_out"], tables["train"]):
-        remarks.append(
-            "held_out: a recording has the same samples as one in training: its error is no"
-            " evidence for a model"
-        )
-    tables = _on_one_rate(study, tables, remarks)
+    tables = _on_one_rate(study, _tables(study, remarks), remarks)
     altered = [word for group in tables.values() for table in group for word in table.altered]
     dt = tables["train"][0].dt
     horizon = max(round(file.horizon / dt) if file.horizon else _usual(tables, dt), 2)
@@ -129,6 +116,22 @@ def prepare(study: Study) -> Data:
         altered.append("inputs are missing")
     unlike = tuple(dict.fromkeys(altered))
     return Data(*uses, horizon, tuple(remarks), openings=made["openings"], altered=unlike)
+
+
+def _tables(study: Study, remarks: list[str]) -> dict[str, list[Columns]]:
+    """The recordings by use, with derived signals."""
+    file = study.file
+    uses = {"train": file.train, "held_out": file.held_out, "healthy": file.healthy}
+    tables = {
+        use: [with_derived(read_columns(study.folder, span), file.derive) for span in spans]
+        for use, spans in uses.items()
+    }
+    if any_same(tables["held_out"], tables["train"]):
+        remarks.append(
+            "held_out: a recording has the same samples as one in training: its error is no"
+            " evidence for a model"
+        )
+    return tables
 
 
 def _usual(tables: Mapping[str, Sequence[Columns]], dt: float) -> int:

@@ -8,7 +8,7 @@ from msgspec import structs
 
 from rigwatch.physics.engine.equations import Model
 from rigwatch.wire.errors import ModelError, nearest
-from rigwatch.wire.exchange import ImportMapping, import_file, read_table
+from rigwatch.wire.exchange import ImportMapping, Table, import_file, read_table
 from rigwatch.workbench.data import copies, read_columns
 from rigwatch.workbench.steps.log_columns import Matched, matched
 from rigwatch.workbench.steps.new_files import NewFiles
@@ -81,25 +81,14 @@ def imported(
         ImportDataError: a log cannot be read.
         ModelError: two logs have one name, or columns cannot be matched to the model's signals.
     """
-    names = [path.stem for path in (*logs.data, *logs.healthy)]
-    if twice := {name for name in names if names.count(name) > 1}:
-        raise ModelError(f"--data: found {min(twice)} twice, expected files of different names")
-    if other := [name for name in logs.known if name not in names]:
-        raise ModelError(
-            f"--set: found log {min(other)!r}{nearest(min(other), dict.fromkeys(names))}"
-        )
+    _check_names(logs)
     reading, remarks, stated = None, list[tuple[str, str]](), dict[str, dict[str, float]]()
     for path in (*logs.data, *logs.healthy):
         if path.suffix == ".mcap":
             files.copied(path)
             continue
         table = read_table(path, logs.mapping)
-        try:
-            dated = [name for name in table.names if table.states_time(name)]
-            given, counted = logs.mapping.channels, logs.mapping.rate is not None
-            found = matched(table.names, model, given, logs.mapping.time, dated, counted=counted)
-        except ModelError as error:
-            raise ModelError(f"{path}: {error}") from None
+        found = _matched(path, table, logs.mapping, model)
         # A log of a real machine has gaps: missing values are invalid samples, not errors.
         # The model states the unit of a signal, whatever its name stands for elsewhere.
         mapping = structs.replace(
@@ -116,6 +105,27 @@ def imported(
         remarks += [(path.name, remark) for remark in told]
         reading = reading or found
     return reading or Matched({}, "", {}, ()), _each_once(remarks), stated
+
+
+def _check_names(logs: Logs) -> None:
+    """Raises a `ModelError` if two logs have one name, or a value is given to none of them."""
+    names = [path.stem for path in (*logs.data, *logs.healthy)]
+    if twice := {name for name in names if names.count(name) > 1}:
+        raise ModelError(f"--data: found {min(twice)} twice, expected files of different names")
+    if other := [name for name in logs.known if name not in names]:
+        raise ModelError(
+            f"--set: found log {min(other)!r}{nearest(min(other), dict.fromkeys(names))}"
+        )
+
+
+def _matched(path: Path, table: Table, mapping: ImportMapping, model: Model) -> Matched:
+    """The columns of a log that the model's signals are read from; errors name the log."""
+    dated = [name for name in table.names if table.states_time(name)]
+    given, counted = mapping.channels, mapping.rate is not None
+    try:
+        return matched(table.names, model, given, mapping.time, dated, counted=counted)
+    except ModelError as error:
+        raise ModelError(f"{path}: {error}") from None
 
 
 def _held(model: Model) -> tuple[str, ...]:

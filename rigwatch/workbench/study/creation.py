@@ -71,7 +71,9 @@ def create(folder: Path | str, template: Path | str, sessions: Path | str | None
     for name, where in files.items():
         path = where / name
         if not path.exists():
-            raise ConfigError(template, name, "no such file", f"a file of this name in {where}")
+            told = "; --sessions names the recordings' folder" if name in spans else ""
+            expected = f"a file of this name in {where}{told}"
+            raise ConfigError(template, name, "no such file", expected)
         from_study = os.path.relpath(path.resolve(), folder.resolve())
         text = text.replace(f'"{name}"', f'"{Path(from_study).as_posix()}"')
     return start_study(folder, text)
