@@ -93,3 +93,30 @@ def turn_load(inputs: FloatArray, dt: float, hidden: str) -> FloatArray:
             angle += h * own / MOTOR
             beyond += h * driven / LOAD
     return read
+
+
+CABLE, INERTIA, FRICTION = 0.3, 1e-3, 2e-4
+"""[ohm], [kg m^2], [N m s/rad]."""
+MOTOR_INDUCTANCE = 0.01
+"""[H]."""
+
+
+def armature(time: FloatArray, seed: int) -> FloatArray:
+    """Voltage of a motor [V], which turns both ways."""
+    return sines(time, LINES, 8.0, seed)[:, None]
+
+
+def spin(inputs: FloatArray, dt: float, hidden: str) -> FloatArray:
+    """Speed of a motor behind a cable [rad/s], shape (n, 1); its winding is on the data sheet."""
+    flux, turning, h = 0.0, 0.0, dt / STEPS
+    cable = CABLE if hidden == "series_resistance" else 0.0
+    read = np.empty((len(inputs), 1))
+    for k in range(len(inputs)):
+        for step in range(STEPS):
+            speed, current = turning / INERTIA, flux / MOTOR_INDUCTANCE
+            if step == 0:
+                read[k] = speed
+            volt = between(inputs, k, step / STEPS)[0]
+            flux += h * (volt - (1.0 + cable) * current - TORQUE * speed)
+            turning += h * (TORQUE * current - FRICTION * speed)
+    return read

@@ -80,6 +80,7 @@ OUTLETS: dict[str, Callable[[float], float]] = {
     "one_way_flow": _valve,
     "one_way_flow_back": lambda above: -_valve(-above),
     "overflow": lambda above: 3e-4 * (above - 1.2e4) if above > 1.2e4 else 0.0,
+    "orifice": lambda above: math.copysign(0.02 * math.sqrt(abs(above)), above),
     "cavitating_flow": lambda above: 1.5e-4 * math.copysign(min(abs(above), 7e3), above),
 }
 """Pressure above the outside [Pa] → flow that leaves [Pa m^3/s]."""
@@ -112,6 +113,7 @@ TORQUES: dict[str, Callable[[FloatArray, FloatArray, FloatArray], float | FloatA
     "zero_by_temperature": lambda speed, load, warmer: 1e-3 * warmer,
     "gain_by_temperature": lambda speed, load, warmer: 3e-3 * (2e-3 * speed + 0.1) * warmer,
     "cross_axis": lambda speed, load, warmer: 5e-4 * load,
+    "load_dependent": lambda speed, load, warmer: 3e-4 * np.abs(load) * np.sign(speed),
 }
 """What the torque is more than it should be [N m]."""
 

@@ -8,19 +8,18 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.signal import lsim
 
 from rigwatch.wire.arrays import FloatArray
+from sim_plant.specimens.converters import DRIVES, as_read
+from sim_plant.specimens.presliding import PRESLIDING, SlipElement
 from sim_plant.specimens.specimen import between, sines
+from sim_plant.specimens.springs_and_slides import SLIDES, SPRINGS, STIFFNESS, Contact
 
-MASS, DAMPING, STIFFNESS = 0.8, 1.5, 60.0
-"""[kg], [N s/m], [N/m]."""
+MASS, DAMPING = 0.8, 1.5
+"""[kg], [N s/m]."""
 STEPS = 24
 """Between two samples."""
 LINES = np.arange(0.25, 6, 0.25)
-
-Contact = Callable[[float, float, float, float], float]
-"""Time, position, velocity and step → force."""
 
 
 def drive(time: FloatArray, seed: int) -> FloatArray:
@@ -31,7 +30,7 @@ def drive(time: FloatArray, seed: int) -> FloatArray:
 def march(inputs: FloatArray, dt: float, hidden: str) -> FloatArray:
     """Position and acceleration as the sensors read them, shape (n, 2)."""
     contact = CONTACTS[hidden]() if hidden in CONTACTS else None
-    send = DRIVES.get(hidden, _as_sent)
+    send = DRIVES[hidden]() if hidden in DRIVES else _as_sent
     x, v, h = 0.0, 0.0, dt / STEPS
     read = np.empty((len(inputs), 2))
     for k in range(len(inputs)):
@@ -43,20 +42,7 @@ def march(inputs: FloatArray, dt: float, hidden: str) -> FloatArray:
                 read[k] = x, force / MASS
             v += h * force / MASS
             x += h * v
-    return SENSORS[hidden](read, dt) if hidden in SENSORS else read
-
-
-class SlipElement:
-    """A spring in series with a dry slider: it stretches until the slider slips."""
-
-    def __init__(self, stretch: float, force: float) -> None:
-        self._most, self._force, self._stretched = stretch, force, 0.0
-
-    def __call__(self, _t: float, _x: float, v: float, h: float) -> float:
-        """The slider's force."""
-        moved = self._stretched + v * h
-        self._stretched = max(-self._most, min(self._most, moved))
-        return -self._force * self._stretched / self._most
+    return as_read(read, dt, hidden)
 
 
 def two_sliders() -> Contact:
@@ -128,6 +114,10 @@ def _bumper(x: float) -> float:
 
 
 CONTACTS: dict[str, Callable[[], Contact]] = {
+    **SPRINGS,
+    **SLIDES,
+    **PRESLIDING,
+    "jenkins_behind_gap": lambda: InAFork(0.06, SlipElement(0.015, 0.8).moved),
     "maxwell_slip": two_sliders,
     "slider_behind_gap": lambda: SliderInAFork(0.06, 0.6),
     "viscous_behind_play": lambda: InAFork(0.06, lambda moved, h: -1.5 * moved / h),
@@ -149,49 +139,3 @@ CONTACTS: dict[str, Callable[[], Contact]] = {
 
 def _as_sent(_t: float, u: float) -> float:
     return u
-
-
-def _curved(u: float) -> float:
-    """A force constant that falls as the iron fills."""
-    return 12.0 * math.atan(u / 12.0)
-
-
-DRIVES: dict[str, Callable[[float, float], float]] = {
-    "dead_band_above": lambda t, u: u if u < 0 else max(u - 0.7, 0.0),
-    "dead_band_below": lambda t, u: u if u > 0 else min(u + 0.7, 0.0),
-    "underlap": lambda t, u: 2 * u if abs(u) < 0.8 else u + math.copysign(0.8, u),
-    "compression": lambda t, u: _curved(u),
-    "gain_drift": lambda t, u: (1 + 0.03 * t) * u,
-}
-"""Time and command → force."""
-
-
-def _hummed(read: FloatArray, dt: float) -> FloatArray:
-    """The mains at the accelerometer, 50 times a second."""
-    time = dt * np.arange(len(read))
-    return np.asarray(read + np.outer(np.cos(100 * np.pi * time + 0.6), [0.0, 0.3]))
-
-
-def _played(read: FloatArray, _dt: float) -> FloatArray:
-    """The position behind a gear with play."""
-    shown, at = read.copy(), float(read[0, 0])
-    for k, x in enumerate(read[:, 0]):
-        at = min(max(at, x - 0.004), x + 0.004)
-        shown[k, 0] = at
-    return shown
-
-
-def _slow_and_late(read: FloatArray, dt: float) -> FloatArray:
-    """An accelerometer with an analogue filter, whose reading is sent 20 ms late."""
-    time, shown = dt * np.arange(len(read)), read.copy()
-    filtered = lsim(([1.0], [0.025, 1.0]), read[:, 1], time, read[0, 1] * 0.025)[1]
-    shown[:, 1] = np.interp(time - 0.02, time, filtered)
-    return shown
-
-
-SENSORS: dict[str, Callable[[FloatArray, float], FloatArray]] = {
-    "hum": _hummed,
-    "sensor_play": _played,
-    "delay_after_lag": _slow_and_late,
-}
-"""What the sensors make of position and acceleration (n, 2), and time between samples [s]."""

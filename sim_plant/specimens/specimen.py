@@ -54,11 +54,13 @@ class Specimen:
         machine: the machine.
         hidden: the effect that can be hidden.
         named: effects at ports by which a workbench names it.
+        known: effects at ports that the model needs to have already.
     """
 
     machine: Machine
     hidden: str
     named: tuple[str, ...]
+    known: tuple[str, ...] = ()
 
     def record(self, seed: int, *, hidden: bool, samples: int = 1024) -> Recorded:
         """One recording, healthy or not."""

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from rigwatch.commands import main
+from rigwatch.commands.catalogue.effect_table import listed
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import Model, shipped_models
 from rigwatch.wire.typed_files.loading import parse
 from rigwatch.workbench.catalogue import effect_curves, model_report, text_plot
-from rigwatch.workbench.effect_table import listed
 
 GUIDE = Path(__file__).parents[2] / "docs" / "models.md"
 SNIPPETS = re.findall(r"```toml\n(.*?)```", GUIDE.read_text("utf-8"), re.DOTALL)
@@ -52,6 +52,24 @@ def test_what_no_output_shows_and_nothing_uses_is_reported() -> None:
     assert found.unseen == ("x",)
     assert found.tied == ("a", "b")
     assert found.start == ("x", "a", "b")
+
+
+def test_what_suits_a_port_is_counted_and_a_variable_that_no_effect_reads_is_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    speed = '= { expression = "v", unit = "m/s" }'
+    port = f'ports.hand = {{ kind = "force", unit = "N", variables.v {speed} }}\n'
+    text = UNSEEN.replace('"force/m"', '"(force + hand)/m"') + port
+    named = model_report(parse(text, Model, "hand"), {})
+    assert not named.unread
+    assert named.entering["hand"] > 20
+
+    file = tmp_path / "hand.toml"
+    file.write_text(text.replace("variables.v ", "variables.velocity "))
+    main(["model", "check", str(file)])
+    said = capsys.readouterr().out
+    assert "hand.velocity: no effect of the library uses a variable of this name" in said
+    assert "suit its ports: 2 at hand" in said
 
 
 def test_every_effect_is_drawn_and_does_something() -> None:

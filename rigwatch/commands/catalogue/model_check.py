@@ -54,6 +54,8 @@ def _value(text: str) -> tuple[str, float]:
 
 
 def _lines(name: str, report: "ModelReport") -> list[str]:
+    from rigwatch.workbench.catalogue import variables_known
+
     lines = [f"{name}: equations and units are consistent, every port is used in an equation"]
     said = (
         (report.unused, "used in no equation and at no port"),
@@ -67,8 +69,15 @@ def _lines(name: str, report: "ModelReport") -> list[str]:
             report.absolute,
             "a temperature that multiplies something: 0 degC are 273.15 K; give a difference in K",
         ),
+        (
+            report.unread,
+            "no effect of the library uses a variable of this name; theirs are"
+            f" {', '.join(sorted(variables_known()))}",
+        ),
     )
     lines += [f"  {one}: {what}" for names, what in said for one in names]
+    ports = ", ".join(f"{count} at {port}" for port, count in report.entering.items())
+    lines += [f"  effects that suit its ports: {ports or 'none, as it has no ports'}"]
     return [*lines, *([f"  {report.trouble}"] if report.trouble else [])]
 
 

@@ -9,6 +9,7 @@ from rigwatch.workbench.catalogue.drafts import Draft, draft_of_effects, draft_o
 from rigwatch.workbench.catalogue.drawings import plotted, text_plot
 from rigwatch.workbench.catalogue.effect_curves import Curve, effect_curves
 from rigwatch.workbench.catalogue.model_report import ModelReport, model_report
+from rigwatch.workbench.catalogue.port_report import variables_known
 from rigwatch.workbench.catalogue.problems import Problem
 
 __all__ = [
@@ -22,4 +23,5 @@ __all__ = [
     "model_report",
     "plotted",
     "text_plot",
+    "variables_known",
 ]

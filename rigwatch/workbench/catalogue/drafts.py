@@ -16,6 +16,7 @@ FINDINGS = {
     "unseen": "no output depends on it, so no recording can determine it",
     "tied": "the outputs cannot distinguish it from another of these",
     "start": "no channel measures it: a fit estimates its initial value from the outputs",
+    "unread": "no effect of the library uses a variable of this name",
 }
 """Findings of a model's report, in words."""
 SEVERE = ("unused", "tied")
@@ -98,6 +99,9 @@ def draft_of_model(text: str, name: str) -> Draft:
 
 
 def _table(model: Model, name: str) -> str:
+    """The table that a finding is about; one on a variable, "port.variable", is at its port."""
+    if "." in name:
+        return f"ports.{name.partition('.')[0]}"
     tables = ("parameters", "inputs", "quantities", "states")
     return next((f"{table}.{name}" for table in tables if name in getattr(model, table)), name)
 

@@ -1,4 +1,4 @@
-"""Checks a model file: units, unused names, unobservable states.
+"""Checks a model file: units, unused names, unobservable states, effects at its ports.
 
 Observability is computed from one run with exact sensitivities: the derivatives of the outputs by
 the initial states, over the settling time of the slowest state. A state whose column vanishes is
@@ -7,7 +7,7 @@ A. J. Krener, IEEE TAC 22(5), 1977; here numerically, along one run).
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import sympy
@@ -25,6 +25,7 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.units import unit_of
 from rigwatch.workbench.catalogue.effect_curves import Curve
+from rigwatch.workbench.catalogue.port_report import entering, unread
 
 STEPS = (1.0, 0.1, 0.01, 0.0)
 """Step sizes of the inputs; the first with which the run stays finite is used."""
@@ -46,6 +47,8 @@ class ModelReport:
         tied: states that the outputs cannot distinguish.
         start: states that no channel measures, which start at the file's values.
         absolute: parameters in degC or degF that multiply something, as only a difference would.
+        entering: number of effects of the library that suit each port, by its name.
+        unread: variables of ports that no effect of the library uses, as "port.variable".
         step: step size of the inputs that are not given.
         run: the outputs from the file's initial state with these inputs; none without states.
         trouble: why the run failed.
@@ -56,6 +59,8 @@ class ModelReport:
     tied: tuple[str, ...]
     start: tuple[str, ...]
     absolute: tuple[str, ...]
+    entering: Mapping[str, int]
+    unread: tuple[str, ...]
     step: float
     run: tuple[Curve, ...]
     trouble: str = ""
@@ -83,9 +88,19 @@ def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> 
         raise ModelError(f"{where}: found input {min(unknown)!r}, expected one of {known}")
     shown = {state.name for state in measured_states(model)}
     start = tuple(name for name in model.states if name not in shown)
-    unused, absolute = _unused(model, system), _absolute_factors(model, system)
+    told = ModelReport(
+        unused=_unused(model, system),
+        unseen=(),
+        tied=(),
+        start=start,
+        absolute=_absolute_factors(model, system),
+        entering=entering(model),
+        unread=unread(model),
+        step=0.0,
+        run=(),
+    )
     if not model.states:
-        return ModelReport(unused, (), (), start, absolute, 0.0, ())
+        return told
     for step in STEPS:
         given = dict.fromkeys(model.inputs, step) | dict(inputs)
         time, outputs, slopes = _run(system, given)
@@ -93,15 +108,15 @@ def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> 
             break
     else:
         trouble = "the run diverged (NaN or infinite), expected other starts, parameters or inputs"
-        return ModelReport(unused, (), (), start, absolute, 0.0, (), trouble)
+        return replace(told, trouble=trouble)
     curves = tuple(
         Curve(
             "time [s]", f"{name} [{own.shown or own.unit}]", time, _shown(own, outputs[:, column])
         )
         for column, (name, own) in enumerate(model.outputs.items())
     )
-    seen = _observed(list(model.states), slopes)
-    return ModelReport(unused, *seen, start, absolute, step, curves)
+    unseen, tied = _observed(list(model.states), slopes)
+    return replace(told, unseen=unseen, tied=tied, step=step, run=curves)
 
 
 def _shown(output: Output, values: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.explain.indistinguishable import same_family
-from rigwatch.workbench.explain.remaining_error import LITTLE, explains
+from rigwatch.workbench.explain.remaining_error import LITTLE, explains, shows_little_of_it
 from rigwatch.workbench.fit import Fitted
 from rigwatch.workbench.ranking import MATERIAL, Ranked, difference
 
@@ -44,16 +44,24 @@ def explaining_training(base: Fitted, best: Ranked, rows: Sequence[Ranked]) -> t
 
 
 def explaining_all(
-    base: Fitted, best: Ranked, rows: Sequence[Ranked], floor: NoiseFloor
+    base: Fitted,
+    best: Ranked,
+    members: Sequence[str],
+    rows: Sequence[Ranked],
+    floor: NoiseFloor,
 ) -> tuple[str, ...]:
     """Labels of accepted effects, no less simple, that leave less of all recordings than the best.
 
-    While much remains, that one effect leads on the few recordings held out and another on all of
-    them is chance: what is missing beside them may favour either. Members of the best's class, and
-    those that lead on both and are passed over for a simpler effect, are no such rivals.
+    While much remains, held out or in training, that one effect leads on the few recordings held
+    out and another on all of them is chance: what is missing beside them may favour either.
+    Members of the best's class, and those that lead on both and are passed over for a simpler
+    effect, are no such rivals.
     """
     assert best.fitted is not None
-    if explains(base, best, floor):
+    much_in_training = shows_little_of_it(base, best, floor)
+    if floor.reached(best.fitted.held_out) or (
+        explains(base, best, floor) and not much_in_training
+    ):
         return ()
     least = energy_of_all(best.fitted)
     return tuple(
@@ -64,7 +72,7 @@ def explaining_all(
         and row.fitted is not None
         and row.free <= best.free
         and row.held_out_error >= best.held_out_error
-        and row.label not in best.alike
+        and row.label not in members
         and not same_family(best, row)
         and energy_of_all(row.fitted) < least
     )

@@ -13,6 +13,9 @@ from rigwatch.workbench.ranking import EXPLAINED, Ranked, left_over
 LITTLE = 1 / 3
 """Share of the energy above the quiet band that the missing effect must explain; one of three
 equal effects explains that much."""
+LITTLE_BESIDE = 1 / 2
+"""The same of training and held-out recordings alike where the model has an effect already: one of
+two that are left explains that much."""
 LITTLE_IN_TRAINING = LITTLE / 2
 """The same of the training, which excites a missing effect about as much as what is held out."""
 MENTIONED = 3
@@ -31,7 +34,12 @@ def explains_little(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
     """
     if not floor.lower_limit:
         return not explains(base, row, floor)
-    return left_over(base, row, floor, tolerant=True) > 1 - LITTLE
+    if left_over(base, row, floor, tolerant=True) > 1 - LITTLE:
+        return True
+    assert row.fitted is not None
+    train = floor.left_over(base.train, row.fitted.train)
+    left = min(left_over(base, row, floor), train)
+    return bool(base.placements) and left > 1 - LITTLE_BESIDE
 
 
 def hardly_trains(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:

@@ -45,7 +45,8 @@ Word = Literal[
     "nothing_missing", "missing_effect", "undetermined", "unknown_effect", "model_inadequate"
 ]
 LITTLE_MORE = 0.01
-"""Relative difference of errors too small to justify a further parameter above the noise floor."""
+"""Relative difference of errors too small to justify a further parameter above the noise floor;
+within a family it is `MATERIAL`."""
 CHANCE = 0.05
 """p-value of the best effect from which coloured noise explains the error as well."""
 MOST_OF_IT = 0.75
@@ -120,7 +121,7 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
     word, text = _word(base, best, rivals, floor)
     ahead = None if trusted else _passed_over(best, accepted)
     if word == "missing_effect":
-        doubt = _doubt(base, best, ahead, rows, floor, trusted=trusted)
+        doubt = _doubt(base, best, ahead, rows, floor, members=members, trusted=trusted)
         word, rivals, text = doubt or (word, rivals, text)
     if word == "undetermined" and ahead is not None and ahead.label not in (*members, *rivals):
         rivals = (*rivals, ahead.label)
@@ -135,6 +136,7 @@ def _doubt(
     rows: Sequence[Ranked],
     floor: NoiseFloor,
     *,
+    members: Sequence[str],
     trusted: bool,
 ) -> tuple[Word, tuple[str, ...], str] | None:
     """Verdict, rivals and sentence if other recordings speak for other effects; otherwise None.
@@ -142,6 +144,7 @@ def _doubt(
     Args:
         base, best, rows, floor: the model, the effect named, the ranking and the noise floor.
         ahead: the effect that was passed over for its parameters.
+        members: labels of the class of the effect named.
         trusted: whether the effect named reaches the noise floor.
     """
     leads = f"{best.label} lowers the held-out error most"
@@ -150,7 +153,7 @@ def _doubt(
     if not trusted and (elsewhere := explaining_training(base, best, rows)):
         much = f"more than {CONTRADICTED:g} times as much of the training error"
         return "undetermined", elsewhere, f"{leads}, but {', '.join(elsewhere)} explains {much}"
-    if better := explaining_all(base, best, rows, floor):
+    if better := explaining_all(base, best, members, rows, floor):
         more = "more of all recordings together"
         return "undetermined", better, f"{leads}, but {', '.join(better)} explains {more}"
     if hardly_trains(base, best, floor):
@@ -292,10 +295,12 @@ def _simplest(row: Ranked) -> tuple[int, bool, float]:
 def _as_good(top: Ranked, row: Ranked, floor: NoiseFloor) -> bool:
     """Whether a row is as good as the one with the smallest held-out error.
 
-    Above the noise floor a slightly smaller error does not justify a further parameter.
+    Above the noise floor a slightly smaller error does not justify a further parameter. Within one
+    family that parameter refines the physics, and has to lower the error as much as an effect has.
     """
     assert top.fitted is not None
     if row is top or equal(top, row, 0.0):
         return True
-    little = row.held_out_error <= top.held_out_error * (1 + LITTLE_MORE)
+    margin = MATERIAL if same_family(top, row) else LITTLE_MORE
+    little = (1 - margin) * row.held_out_error <= top.held_out_error
     return row.free < top.free and little and not floor.reached(top.fitted.held_out)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from rigwatch.physics.engine.equations import Input, Model, Output, model_named
+from rigwatch.physics.engine.equations import Input, Model, Output, check_model, model_named
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.units import is_unit, unit_of
 from rigwatch.workbench.data import (
@@ -49,6 +49,8 @@ def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
     """
     check_new(folder)
     model = model_named(logs.model)
+    # Before the logs are read, and with the name of the file that has to be changed.
+    check_model(model, logs.model)
     check_names(logs, model)
     with NewFiles(folder) as files:
         reading, remarks, stated = imported(files, logs, model)

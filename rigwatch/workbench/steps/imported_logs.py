@@ -41,14 +41,17 @@ class Logs:
 
 
 def check_names(logs: Logs, model: Model) -> None:
-    """Check that all values belong to parameters of the model.
+    """Check that all values belong to parameters of the model and are within their bounds.
 
     Raises:
-        ModelError: one does not.
+        ModelError: one is not.
     """
     for values in (logs.start, *logs.known.values()):
         if other := [name for name in values if name not in model.parameters]:
             raise ModelError(f"--set: found {other[0]!r}{nearest(other[0], model.parameters)}")
+        for name, value in values.items():
+            if broken := model.parameters[name].bounds_broken(value):
+                raise ModelError(f"--set: found {name} = {value:g}, expected {broken}")
 
 
 def check_different(folder: Path, logs: Logs) -> None:

@@ -37,7 +37,7 @@ from rigwatch.wire.typed_files import parse, read_text
 from rigwatch.wire.units import Unit, unit_of
 from rigwatch.workbench.study.elements import elements_of, with_element, written_variants
 from rigwatch.workbench.study.folder import FILE, LEDGER, settle
-from rigwatch.workbench.study.known_values import with_known_values
+from rigwatch.workbench.study.known_values import check_values, with_known_values
 from rigwatch.workbench.study.moving_parameters import fitted_by_recording, told_apart
 from rigwatch.workbench.study.own_files import NOTHING_UNSAVED, Unsaved, content
 from rigwatch.workbench.study.recording_parameters import (
@@ -209,6 +209,7 @@ def study_of(folder: Path, text: str, unsaved: Mapping[str, Unsaved] = NOTHING_U
     effects = {**library(), **given}
     written = _written(folder, file, own_files)
     in_si = known_in_si(written, file, folder / FILE)
+    check_values(written, file, folder / FILE)
     known, file = known_of(written, file), told_apart(written, in_si)
     model, holds = _as_studied(written, file)
     study = Study(

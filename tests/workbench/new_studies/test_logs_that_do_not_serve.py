@@ -69,6 +69,13 @@ def test_a_value_of_an_unknown_parameter_is_refused_at_once(tmp_path, run, capsy
     assert "--set: found 'nosuch'" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("option", ["J=-2", "run:J=-2"])
+def test_a_known_value_out_of_its_bounds_is_refused_at_once(tmp_path, run, capsys, option):
+    assert new(tmp_path, written(tmp_path / "run.csv", run), "--set", option) == 2
+    assert "--set: found J = -2, expected at least 1e-08 kg m^2" in capsys.readouterr().err
+    assert not (tmp_path / "study").exists()
+
+
 def test_a_time_under_another_name_is_asked_for_and_may_be_named_as_it_stands(
     tmp_path, run, capsys
 ):

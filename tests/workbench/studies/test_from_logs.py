@@ -195,6 +195,7 @@ def test_a_model_of_ones_own_with_wrong_units_says_so_and_leaves_no_folder(tmp_p
     log_file = written(tmp_path / "run.csv", run)
     assert made(tmp_path, log_file, more=["--model", str(tmp_path / "mine.toml")]) == 2
     said = capsys.readouterr().err
+    assert said.startswith(f"rigwatch: {tmp_path / 'mine.toml'}: ")  # the file to be changed
     assert "expected one unit" in said
     assert "directory not empty" not in said
     assert not (tmp_path / "study").exists()

@@ -172,3 +172,7 @@ def test_a_models_findings_stand_at_their_tables() -> None:
     assert not found.usable
     assert [text.count("\n") + 2] == [one.line for one in found.problems if one.severe]
     assert found.drawn["mass-spring-damper"]
+    misnamed = text.replace("variables.v =", "variables.velocity =")
+    (problem,) = [one for one in draft_of_model(misnamed, NAME).problems if "library" in one.text]
+    assert not problem.severe
+    assert misnamed.splitlines()[problem.line - 1] == "[ports.load]"

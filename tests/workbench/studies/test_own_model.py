@@ -7,7 +7,7 @@ import pytest
 
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.model_check import check_model
-from rigwatch.wire.errors import ModelError
+from rigwatch.wire.errors import ConfigError, ModelError
 from rigwatch.workbench.compare.compare import compare
 from rigwatch.workbench.explain.explain import explain
 from rigwatch.workbench.study.study import Study
@@ -77,6 +77,16 @@ def test_without_ports_it_is_compared_and_explain_asks_for_one(tmp_path: Path) -
         ("parameters.a", "parameters.lambda", "parameters.lambda: found a name that equations use"),
         ("parameters.a", "parameters.v", "parameters.v: found 'v' again after states.v"),
         ('measured = "v"', 'measured = "vel"', "states.v.measured: found channel 'vel'.*: u, v"),
+        (
+            "a = { value = 1.0",
+            "a = { low = 3.0, value = 1.0",
+            "parameters.a: found value = 1, expected at least 3 1/s",
+        ),
+        (
+            "a = { value = 1.0",
+            "a = { low = 3.0, high = 2.0, value = 2.5",
+            "parameters.a: found low = 3 and high = 2, expected low below high",
+        ),
     ],
 )
 def test_a_slip_is_reported_when_the_study_is_made(
@@ -87,6 +97,22 @@ def test_a_slip_is_reported_when_the_study_is_made(
         motor(tmp_path, text)
     assert "model.toml" in str(error.value)
     assert not (tmp_path / "study" / "study.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ("start = { a = -2.0 }", r"study.toml: start.a: found -2, expected at least 0 1/s"),
+        ("start = { a = 80.0 }", r"study.toml: start.a: found 80, expected at most 60 1/s"),
+    ],
+)
+def test_a_known_value_out_of_its_bounds_is_refused(
+    tmp_path: Path, keys: str, message: str
+) -> None:
+    bounded = (SPEED + PORT).replace("a = { value = 1.0", "a = { low = 0.0, high = 60, value = 1.0")
+    with pytest.raises(ConfigError, match=message):
+        motor(tmp_path, bounded, keys)
+    motor(tmp_path / "kept", bounded, "start = { a = 60.0 }")
 
 
 def test_an_actuator_that_no_equation_uses_is_reported(tmp_path: Path) -> None:

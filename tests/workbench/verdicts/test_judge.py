@@ -17,6 +17,7 @@ from rigwatch.workbench.explain.sets.combination import Combination
 from rigwatch.workbench.explain.sets.several_effects import (
     _Member,
     _with_alternatives,
+    may_need_several,
     with_similar,
 )
 from rigwatch.workbench.explain.verdict import Verdict, judge, not_converged
@@ -217,6 +218,49 @@ def test_an_effect_that_leaves_most_is_not_the_answer() -> None:
     assert remaining_share(base(3.0), best(error=2.0), QUIET) == pytest.approx(0.375)
     assert remaining_share(base(3.0), best(error=1.0), QUIET) == 0.0
     assert judge(base(3.0), [best(error=2.7)], QUIET).word == "unknown_effect"
+
+
+@pytest.mark.parametrize(
+    ("train", "like", "word"),
+    [
+        pytest.param(2.2, (), "undetermined", id="a third of the training remains"),
+        pytest.param(1.05, (), "missing_effect", id="nothing of it"),
+        pytest.param(2.2, ("b@x",), "undetermined", id="like it, but unlike held out"),
+    ],
+)
+def test_what_explains_the_held_out_alone_gives_way_to_what_explains_more_of_all(
+    train: float, like: tuple[str, ...], word: str
+) -> None:
+    """As a dead band of a pump beside outlets that follow another law than the model's."""
+    only = trained(best(error=1.3, alike=like, cosines={"b@x": 0.97}), train)
+    rival = trained(row("b@x", 2.2), 1.0)
+    found = judge(replace(base(6.0), train=base(3.4).train), [only, rival], QUIET)
+    assert found.word == word
+    assert found.rivals == (("b@x",) if word == "undetermined" else ())
+
+
+@pytest.mark.parametrize(("train", "several"), [(2.2, True), (1.05, False)])
+def test_sets_are_tried_where_an_effect_leaves_much_of_the_training_alone(
+    train: float, *, several: bool
+) -> None:
+    only = trained(best(error=1.3), train)
+    before = replace(base(6.0), train=base(3.4).train)
+    bench: Any = SimpleNamespace(base=before, floor=PERIODS, data=SimpleNamespace(of_healthy=None))
+    verdict = Verdict("missing_effect", only, (only.label,), (), "")
+    assert may_need_several(bench, verdict) is several
+
+
+@pytest.mark.parametrize(
+    ("held_out", "train", "word"),
+    [(2.3, 2.3, "unknown_effect"), (2.3, 2.0, "missing_effect"), (2.0, 2.3, "missing_effect")],
+)
+def test_beside_an_accepted_effect_one_that_leaves_most_of_both_is_not_the_answer(
+    held_out: float, train: float, word: str
+) -> None:
+    only = trained(best(error=held_out), train)
+    assert judge(base(3.0), [only], QUIET).word == "missing_effect"
+    later = replace(base(3.0), placements=(row("a@x").placement,))
+    assert judge(later, [only], QUIET).word == word
 
 
 def trained(found: Ranked, error: float) -> Ranked:
@@ -564,6 +608,17 @@ def test_while_more_is_missing_a_little_less_is_no_reason_for_a_parameter(
 ) -> None:
     rows = best("b@x", error=level, free=2), row("a@x", level * ratio, jitter=0.001)
     assert name_of(*rows) == named
+
+
+@pytest.mark.parametrize(("ratio", "named"), [(1.025, "dahl@x"), (1.04, "lugre@x")])
+def test_a_refinement_of_one_family_must_gain_as_much_as_an_effect(
+    ratio: float, named: str
+) -> None:
+    richer = best("lugre@x", error=2.0, free=3, family="friction")
+    simpler = row("dahl@x", 2.0 * ratio, jitter=0.001, free=2, family="friction")
+    assert name_of(richer, simpler) == named
+    other = row("dahl@x", 2.0 * ratio, jitter=0.001, free=2, family="drag")
+    assert name_of(richer, other) == "lugre@x"
 
 
 def test_a_little_less_is_a_reason_between_effects_of_as_many_parameters() -> None:

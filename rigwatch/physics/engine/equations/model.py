@@ -102,6 +102,20 @@ class Parameter(Section, frozen=True, kw_only=True):
         """Whether it belongs to one recording and is fitted to its opening, not to what counts."""
         return self.per_recording and self.fixed
 
+    def bounds_broken(self, written: float) -> str:
+        """The bound that a value in the unit of the file does not keep, in words; empty if none.
+
+        A value that rounding has moved from a bound keeps it.
+        """
+        name = self.shown or self.unit
+        unit = unit_of(name)
+        value = float(unit.to_si(written))
+        kept = self.low <= value <= self.high
+        if kept or math.isclose(value, self.low) or math.isclose(value, self.high):
+            return ""
+        bound, most = (self.low, "at least") if value < self.low else (self.high, "at most")
+        return f"{most} {unit.from_si(bound):g} {'' if name == '1' else name}".rstrip()
+
     def __post_init__(self) -> None:
         if math.isnan(self.value):
             if self.fixed:

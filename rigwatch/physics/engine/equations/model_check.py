@@ -13,6 +13,7 @@ from rigwatch.physics.engine.equations.scope import symbol
 from rigwatch.physics.engine.equations.system import PROBE, TIME, UNTIL, System, compose
 from rigwatch.physics.engine.equations.variants import with_variants
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.units import unit_of
 
 _TABLES = ("inputs", "states", "parameters", "quantities", "ports")
 
@@ -26,7 +27,8 @@ def check_model(model: Model, where: str = "") -> System:
 
     Raises:
         ModelError: a name is reserved or used twice, an equation does not parse or has wrong
-            units, a state names an unknown channel, or a port is used in no equation.
+            units, a state names an unknown channel, a parameter is out of its bounds, or a port is
+            used in no equation.
     """
     try:
         _check_names(model)
@@ -34,6 +36,7 @@ def check_model(model: Model, where: str = "") -> System:
         _check_sensors(model)
         _check_quantities(model)
         _check_per_recording(model)
+        _check_bounds(model)
         system = compose(model)
     except ModelError as error:
         raise ModelError(f"{where}: {error}" if where else str(error)) from None
@@ -93,6 +96,19 @@ def _check_per_recording(model: Model) -> None:
                 f"parameters.{name}: found per_recording and {'fixed' if own.fixed else 'kept'},"
                 " expected one of them"
             )
+
+
+def _check_bounds(model: Model) -> None:
+    for name, own in model.parameters.items():
+        unit = unit_of(own.shown or own.unit)
+        low, high, value = (unit.from_si(number) for number in (own.low, own.high, own.value))
+        if own.low >= own.high:
+            raise ModelError(
+                f"parameters.{name}: found low = {low:g} and high = {high:g}, expected low below"
+                " high"
+            )
+        if broken := own.bounds_broken(value):
+            raise ModelError(f"parameters.{name}: found value = {value:g}, expected {broken}")
 
 
 def _check_channels(model: Model) -> None:

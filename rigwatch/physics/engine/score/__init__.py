@@ -18,7 +18,12 @@ from rigwatch.physics.engine.score.candidates import (
     shaped,
     sizes_at_port,
 )
-from rigwatch.physics.engine.score.compatibility import has_variables, possible, suits
+from rigwatch.physics.engine.score.compatibility import (
+    has_variables,
+    possible,
+    suits,
+    variables_read,
+)
 from rigwatch.physics.engine.score.effect_sensitivities import directions
 from rigwatch.physics.engine.score.finite_effects import finite_effect
 from rigwatch.physics.engine.score.ranking import Standing, cosines_with, freed, standings
@@ -60,4 +65,5 @@ __all__ = [
     "standings",
     "suits",
     "trajectory",
+    "variables_read",
 ]

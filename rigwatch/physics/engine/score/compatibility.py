@@ -36,6 +36,12 @@ def has_variables(effect: Effect, port: Port) -> bool:
     return _named(effect) - own <= set(port.variables)
 
 
+def variables_read(effect: Effect) -> frozenset[str]:
+    """Variables of a port that the effect's equations, units or scales use."""
+    own = {*effect.parameters, *effect.states, "t", RATE, LEFT, "u", "F"}
+    return (_named(effect) | _units_named(effect)) - own
+
+
 def _variables_with_scale(port: Port) -> set[str]:
     """Variables whose unit and size follow from a port's: a distance follows from a speed."""
     names = {*port.variables, "F" if port.kind == "force" else "u"}

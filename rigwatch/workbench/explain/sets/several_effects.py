@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.data import NoiseFloor
+from rigwatch.workbench.explain.remaining_error import shows_little_of_it
 from rigwatch.workbench.explain.sets.combination import (
     Combination,
     floor_of,
@@ -139,11 +140,12 @@ def _max_parameters(bench: Bench, best: Ranked | None) -> int:
 
 
 def _leaves_little(bench: Bench, best: Ranked) -> bool:
-    """Whether a single effect reduces the residual to noise, or nearly so."""
+    """Whether a single effect reduces the residual to noise, or nearly so, also in training."""
     if best.fitted is None:
         return False
-    left = left_over(bench.base, best, bench.floor)
-    return left < 1 - EXPLAINED or reaches_noise(bench, best.fitted)
+    little = left_over(bench.base, best, bench.floor) < 1 - EXPLAINED
+    little = little and not shows_little_of_it(bench.base, best, bench.floor)
+    return little or reaches_noise(bench, best.fitted)
 
 
 def _with_best_set(verdict: Verdict, best: Combination, every: Sequence[Combination]) -> Verdict:
