@@ -128,7 +128,7 @@ class RigMonitor:
         at = self._pipeline.passed(block, published)
         if not out.holds[place] and self.alarms.is_idle:
             if self._wiring is not None:
-                self._wiring.update(block, at)
+                self._wiring.update(block)
             return at, ()
         outputs = out.columns[place], out.reset[place], out.clipping[place]
         return self._completed(Result(at, self._pipeline.steady_conditions(*outputs)), block)
@@ -147,7 +147,7 @@ class RigMonitor:
             own = tuple(c for c in own if c.name.partition(".")[0] in OF_SAMPLES)
         if self._wiring is None:
             return at, (*own, *more, *quality)
-        wrong, wiring = self._wiring.update(fresh, at)
+        wrong, wiring = self._wiring.update(fresh)
         wiring = (*wiring, *self._wiring_put_right(wiring, len(fresh)))
         if wrong is not None and wrong.any():
             at = replace(at, columns=tuple(_disarmed(column, wrong) for column in at.columns))
@@ -190,7 +190,7 @@ class RigMonitor:
             return
         self._sensors.update(_fresh(block, result.estimates))
         if self._wiring is not None:
-            self._wiring.update(_fresh(block, result.estimates), result.estimates)
+            self._wiring.update(_fresh(block, result.estimates))
 
 
 def _fresh(block: SampleBlock, judged: EstimateBlock) -> SampleBlock:

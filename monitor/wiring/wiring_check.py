@@ -3,21 +3,21 @@
     samples ─▶ windows of one second ─▶ motion ratio ─▶ drive ratio ─▶ passed
                                              └───────────────┴▶ failed, after two windows in a row
 
-The drive is compared where a transfer function predicts the acceleration from it; the reference,
-which is learned later, hides a difference. One good window passes until the device or the
-monitor starts again. After a failure nothing is judged until then: a reference learned with wrong
-wiring would count as healthy. From the first bad window on nothing is judged either, until a good
-one; it takes the second to be told.
+The drive is compared where a transfer function predicts the acceleration from it, without the
+reference, which hides a difference once it is learned. One good window passes until the device or
+the monitor starts again. After a failure nothing is judged until then: a reference learned with
+wrong wiring would count as healthy. From the first bad window on nothing is judged either, until a
+good one; it takes the second to be told.
 """
 
 import numpy as np
 
 from monitor.model import RigModel, TransferPlant
 from monitor.signals import Condition, above, usable
-from monitor.wiring.drive_ratio import drive_ratio
+from monitor.wiring.drive_ratio import ModelledDrive, drive_ratio
 from monitor.wiring.motion_ratio import MotionRatio, motion_ratio
 from rigwatch.wire.arrays import BoolArray, FloatArray
-from rigwatch.wire.messages import EstimateBlock, SampleBlock
+from rigwatch.wire.messages import SampleBlock
 
 WINDOW = 1.0
 """Length of a window [s]."""
@@ -49,7 +49,8 @@ class WiringCheck:
 
     def __init__(self, model: RigModel, *, drive: bool = True) -> None:
         self._rate, self._channels = model.sample_rate, model.channels
-        self._drive = drive and isinstance(model.plant, TransferPlant)
+        compared = drive and isinstance(model.plant, TransferPlant)
+        self._drive = ModelledDrive(model) if compared else None
         self._noise = model.noise.residual
         self._length = round(WINDOW * model.sample_rate)
         self._boot = self._next = -1
@@ -58,29 +59,33 @@ class WiringCheck:
     def _restart(self) -> None:
         self._passed = self._sensors_agree = False
         self._failed, self._fails = "", 0
-        self._window: list[FloatArray] = []
+        self._forget()
         self._gain = self._phase = self._ratio = np.nan
 
-    def update(
-        self, block: SampleBlock, at: EstimateBlock
-    ) -> tuple[BoolArray | None, tuple[Condition, ...]]:
+    def _forget(self) -> None:
+        """The next sample does not follow the last one."""
+        self._window: list[FloatArray] = []
+        self._settled = False
+        if self._drive is not None:
+            self._drive.restart()
+
+    def update(self, block: SampleBlock) -> tuple[BoolArray | None, tuple[Condition, ...]]:
         """Whether the wiring is in doubt or wrong at each sample, shape (n,), and conditions.
 
         None once it has passed: none of the samples is in doubt.
 
         Args:
             block: new samples; a gap before it discards the window.
-            at: their estimates.
         """
         if block.boot != self._boot:
             self._restart()
         elif block.seq != self._next:
-            self._window = []
+            self._forget()
         self._boot, self._next = block.boot, block.seq + len(block)
         if self._passed:
             return None, ()
         doubted, wrong = np.zeros((2, len(block)), np.bool_)
-        wrong[self._first_failed(block, at, doubted) :] = True
+        wrong[self._first_failed(block, doubted) :] = True
         return doubted | wrong, tuple(
             above(name, wrong & (name == self._failed), np.full(len(block), value), limit)
             for name, value, limit in (
@@ -96,18 +101,18 @@ class WiringCheck:
         """Whether no sample of a block is in doubt, as the wiring has passed."""
         return self._passed and block.boot == self._boot
 
-    def _first_failed(self, block: SampleBlock, at: EstimateBlock, doubted: BoolArray) -> int:
+    def _first_failed(self, block: SampleBlock, doubted: BoolArray) -> int:
         """The first sample at which the wiring counts as wrong; the block's length if none.
 
         `doubted` is set where the last window was bad.
         """
         if self._failed:
             return 0
-        signals = self._signals(block, at)
+        signals = self._signals(block)
         if signals is None:
             self._passed = True
             return len(block)
-        known: BoolArray = np.isfinite(signals.sum(axis=1))
+        known: BoolArray = np.isfinite(signals[:, :2].sum(axis=1))
         for n, valid in enumerate(known):
             doubted[n] = self._fails > 0
             if not valid:
@@ -116,13 +121,13 @@ class WiringCheck:
             self._window.append(signals[n])
             if len(self._window) == self._length:
                 self._judge(np.array(self._window))
-                self._window = []
+                self._window, self._settled = [], True
                 doubted[n] = self._fails > 0
                 if self._passed or self._failed:
                     return len(block) if self._passed else n
         return len(block)
 
-    def _signals(self, block: SampleBlock, at: EstimateBlock) -> FloatArray | None:
+    def _signals(self, block: SampleBlock) -> FloatArray | None:
         """Position, acceleration and, where it is compared, the modelled acceleration.
 
         NaN where invalid, shape (n, 2 or 3); None without such a pair.
@@ -133,8 +138,8 @@ class WiringCheck:
             return None
         columns = [found[0] for found in pair]
         read = [np.where(usable(c, stuck_counts=True), c.values, np.nan) for c in columns]
-        if self._drive:
-            read.append(at.column("modelled_acceleration").values)
+        if self._drive is not None:
+            read.append(self._drive.update(block))
         return np.stack(read, axis=1)
 
     def _judge(self, window: FloatArray) -> None:
@@ -143,7 +148,7 @@ class WiringCheck:
             return
         reason: str | None = "" if self._sensors_agree else wrong_wiring(found)
         self._sensors_agree = not reason
-        if self._drive and not reason:
+        if self._drive is not None and not reason:
             reason = self._wrong_drive(window)
         if reason is None:
             self._fails = 0
@@ -154,7 +159,9 @@ class WiringCheck:
 
     def _wrong_drive(self, window: FloatArray) -> str | None:
         """What is wrong with the drive, "" if nothing is; None if the window cannot tell."""
-        ratio = drive_ratio(window[:, 1], window[:, 2], self._noise)
+        # The filter starts from rest: half of the first window is left to it.
+        used = window if self._settled else window[self._length // 2 :]
+        ratio = drive_ratio(used[:, 1], used[:, 2], self._noise)
         if ratio is None:
             return None
         self._ratio = ratio

@@ -97,6 +97,15 @@ def test_a_drive_in_the_wrong_unit_or_reversed_is_reported_and_nothing_is_learnt
     assert not any(block.column("armed").values.any() for block in estimates)
 
 
+@pytest.mark.parametrize("begin", range(0, 64, 8))
+def test_the_moment_at_which_a_monitor_starts_does_not_hide_a_wrong_drive(begin: int) -> None:
+    channels = run(SINE, 5.0)
+    channels["voltage"] = 0.1 * channels["voltage"]
+    later = {name: values[begin:] for name, values in channels.items()}
+    times, _ = watched(later, monitor_rig.model())
+    assert times["wiring_drive"] <= 2.0
+
+
 def test_a_rig_that_is_moved_by_hand_is_not_blamed_for_its_drive() -> None:
     channels = run(SINE, 8.0)
     channels["voltage"] = 1e-4 * channels["voltage"]

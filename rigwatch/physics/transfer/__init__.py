@@ -14,10 +14,11 @@ from rigwatch.physics.transfer.output_error import (
     fit_output_error,
 )
 from rigwatch.physics.transfer.period import period_by_correlation, shortest_period
-from rigwatch.physics.transfer.transfer_function import TransferFunction, filter_sample
+from rigwatch.physics.transfer.transfer_function import Filter, TransferFunction, filter_sample
 from rigwatch.physics.transfer.velocity import velocity_filter
 
 __all__ = [
+    "Filter",
     "FrequencyResponse",
     "OutputErrorFit",
     "OutputErrorOrders",
