@@ -138,7 +138,7 @@ def accelerate(  # noqa: PLR0917 -- a kernel
         a[i] = a[i] / mass[i] - base
 
 
-@kernel()
+@kernel(allocates=True)
 def integrate(  # noqa: C901, PLR0912, PLR0917 -- a kernel
     grid: Floats,
     parts: int,

@@ -47,6 +47,7 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
             "bombs",
             "fuzzing",
             "fuzzed_requests",
+            "fuzzed_viewer",
             "replay",
             "windowed_least_squares",
         ),

@@ -1,7 +1,7 @@
 """Prints docs/effects.md from the library of effects: `make docs` writes it."""
 
+from rigwatch.commands.catalogue.effect_table import listed, markdown
 from rigwatch.physics.engine.equations import library
-from rigwatch.workbench.effect_table import listed, markdown
 
 HEAD = """<!-- Printed by `make docs` from rigwatch/physics/effects. -->
 

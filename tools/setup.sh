@@ -54,19 +54,43 @@ progress() {
     count=0
     while read -r word rest; do
         case "$word $rest" in
-        *" (from -r "*)
+        "Collecting "*" (from -r "*)
             count=$((count + 1))
-            if [ $((count % 10)) = 0 ]; then echo "setup:   $count of $1 packages are here"; fi
+            if [ $((count % 10)) = 0 ]; then echo "setup:   $count of $1 are here"; fi
             ;;
-        "Installing collected packages"*) echo "setup:   they are being installed" ;;
+        "Installing collected packages"*) echo "setup:   all are here and are being installed" ;;
         "setup failed") return 1 ;;
         esac
     done
 }
 
+purpose() {
+    case "${1##*/}" in
+    lock.txt) echo "to run it" ;;
+    build.txt) echo "to build it" ;;
+    dev.txt) echo "to check it" ;;
+    mutation.txt) echo "to check its tests" ;;
+    *) echo "to compare it with" ;;
+    esac
+}
+
+# Names as pip compares them, NAME==VERSION a line.
+normalised() {
+    tr 'A-Z_.' 'a-z--'
+}
+
+# Locks share packages: only those that the environment lacks are counted. missing LOCK.
+missing() {
+    for found in "$venv"/lib/python*/site-packages/*.dist-info; do
+        found=${found##*/}
+        echo "${found%.dist-info}"
+    done | sed 's/-/==/' | normalised >"$venv/present.txt"
+    grep -o '^[A-Za-z0-9][^ ]*' "$1" | normalised | grep -c -v -x -F -f "$venv/present.txt" || true
+}
+
 for lock in "$@"; do
-    packages=$(grep -c '^[A-Za-z0-9]' "$lock")
-    echo "setup: $lock: $packages packages"
+    packages=$(missing "$lock")
+    echo "setup: $packages packages $(purpose "$lock") ($lock)"
     { install "$lock" || { cat "$venv/setup-errors.txt" >&2 && echo "setup failed"; }; } \
         | progress "$packages"
 done

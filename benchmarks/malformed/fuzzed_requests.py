@@ -122,7 +122,7 @@ class Client:
     def _send(self, raw: bytes) -> None:
         host, _, port = self.served.address.removeprefix("http://").rpartition(":")
         before, said = self._spent(), len(self.served.said)
-        status = _status(host, int(port), raw)
+        status = answered(host, int(port), raw)
         spent = self._spent() - before
         self.count, self.slowest = self.count + 1, max(self.slowest, spent)
         trouble = "".join(self.served.said[said:])
@@ -160,7 +160,7 @@ def changed(chance: random.Random, body: dict[str, Any]) -> dict[str, Any]:
         at = at[key]
 
 
-def _status(host: str, port: int, raw: bytes) -> int:
+def answered(host: str, port: int, raw: bytes) -> int:
     """The answer's status, 0 if the server closes the line without one, -1 if none comes."""
     try:
         with socket.create_connection((host, port), timeout=PATIENCE_S) as line:

@@ -46,7 +46,7 @@ def read_run(whole: bytes, channels: int, arrived_ns: int) -> RawBlock | None:
     return RawBlock(int(boot[0]), seq, device_us, codes[:found], np.full(found, arrived_ns))
 
 
-@kernel()
+@kernel(allocates=True)
 def _read(
     data: ByteArray, version: int, boot: IntArray, numbers: IntArray, codes: NDArray[np.int16]
 ) -> int:

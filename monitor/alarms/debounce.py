@@ -29,7 +29,7 @@ class Edge:
 
 def is_zero(flags: NDArray[np.uint8]) -> bool:
     """Whether no flag is set; four times as fast as `any` on the few samples of a block."""
-    return not flags.tobytes().strip(b"\0")
+    return flags.tobytes() == bytes(flags.size)
 
 
 class Debouncer:

@@ -213,6 +213,16 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "part, then restart the monitor.",
         _AT_ONCE,
     ),
+    AlarmKind(
+        "wiring_drive",
+        "critical",
+        "the rig answers its drive five times as strongly as its model or a fifth as strongly, or "
+        "with the other sign; the rig is not monitored",
+        "Check sign, unit, gain and range of the drive's channel, and that this device is of the "
+        "rig that the model was made of, then restart the monitor. If all is right, make the model "
+        "anew.",
+        _AT_ONCE,
+    ),
     # The sensors: one alarm per channel.
     AlarmKind(
         "sensor_non_finite",

@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from monitor.signals import copy_rows, fill_rows
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel, part
 
@@ -109,8 +110,8 @@ def judge_flat_tops(  # noqa: PLR0917
         state.filled[0] += 1
         if state.filled[0] == SPAN:
             state.filled[0] = 0
-            state.extreme[1] = state.extreme[0]
-            state.extreme[0, :, :] = -np.inf
+            copy_rows(state.extreme[0], state.extreme[1])
+            fill_rows(state.extreme[0], -np.inf)
 
 
 @part()

@@ -126,7 +126,7 @@ def store_sample(  # noqa: PLR0917
     history.head[0] = head if head < HISTORY else 0
 
 
-@part()
+@part(allocates=True)
 def evidence_of(history: History, ref: Reference, seq: int, since: int, count: int) -> Evidence:
     """Evidence of the newest `count` samples.
 
@@ -149,7 +149,7 @@ def evidence_of(history: History, ref: Reference, seq: int, since: int, count: i
     return _compare(data.T @ data, rest_of(history, n, ref.levels.position_noise), peak)
 
 
-@part()
+@part(allocates=True)
 def rest_of(history: History, n: int, noise: float) -> Rest:
     """Rest in one place over the newest `n` samples; stretches in which the mass drifts are none.
 
@@ -225,7 +225,7 @@ def _fill_rivals(data: FloatArray, ref: Reference, seq: int, n: int) -> None:
         data[k, 7], data[k, 8], data[k, 9], data[k, 10] = x * x, x * dx, x * x * x, x * x * dx
 
 
-@part()
+@part(allocates=True)
 def _fill_friction(data: FloatArray, history: History, since: int, n: int) -> None:
     rows, head = history.rows, history.head[0]
     if since >= HISTORY:
@@ -283,7 +283,7 @@ def _friction_fit(gram: FloatArray, yy: float) -> tuple[float, float]:
     return explained, max(theta1, 0.0) ** 2 * gram[g1, g1] / yy
 
 
-@part()
+@part(allocates=True)
 def _gain_over_rivals(gram: FloatArray) -> tuple[float, float, float]:
     """Residual energy of the rivals, the part of it that the jump explains, and the jump's sign."""
     y, g1 = gram.shape[0] - 1, _RIVALS
@@ -299,7 +299,7 @@ def _gain_over_rivals(gram: FloatArray) -> tuple[float, float, float]:
     return remains, jump, 1.0 if left[g1, y] > 0.0 else -1.0
 
 
-@part()
+@part(allocates=True)
 def _eliminate(gram: FloatArray, pivot: int, least: float) -> None:
     """Project column `pivot` out of all columns; a column already explained is skipped."""
     strength = gram[pivot, pivot]

@@ -80,7 +80,7 @@ def threshold_sample(coefficients: FloatArray, state: ThresholdState, u: float) 
     return float(floor + memory[1])
 
 
-@kernel()
+@kernel(allocates=True)
 def threshold_block(coefficients: FloatArray, state: ThresholdState, u: FloatArray) -> FloatArray:
     """`threshold_sample` over a block, shape (n,)."""
     limit = np.empty(u.size)

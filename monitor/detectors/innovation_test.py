@@ -47,7 +47,7 @@ def clear_nis(window: NisWindow) -> None:
     window.place[0] = window.place[1] = 0
 
 
-@kernel()
+@kernel(allocates=True)
 def push_nis(window: NisWindow, nis: float) -> float:
     """Add one; the sum over the window, NaN until it is full.
 

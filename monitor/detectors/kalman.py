@@ -35,7 +35,7 @@ from rigwatch.wire.errors import ModelError
 from rigwatch.wire.kernel import kernel
 
 
-@kernel()
+@kernel(allocates=True)
 def kalman_update(
     x: FloatArray, p: FloatArray, h: FloatArray, v: FloatArray, y: FloatArray
 ) -> float:
@@ -70,7 +70,7 @@ def kalman_update(
     return total
 
 
-@kernel()
+@kernel(allocates=True)
 def generalised_update(  # noqa: PLR0917 -- a compiled kernel takes no keywords
     x: FloatArray,
     p: FloatArray,

@@ -116,7 +116,7 @@ def _restart(state: ParityState) -> None:
     fill(state.counts, 0)
 
 
-@kernel()
+@kernel(allocates=True)
 def parity_block(  # noqa: PLR0917 -- a compiled kernel takes no keywords
     moving_average: bool,
     function: tuple[FloatArray, FloatArray],

@@ -14,7 +14,7 @@ SMALLEST_PIVOT = 1e-13
 """A pivot below this share of the unit diagonal means a singular matrix [1]."""
 
 
-@kernel()
+@kernel(allocates=True)
 def product(a: FloatArray, b: FloatArray) -> FloatArray:
     """a·b, shape (n, m)."""
     out = np.zeros((a.shape[0], b.shape[1]))
@@ -25,7 +25,7 @@ def product(a: FloatArray, b: FloatArray) -> FloatArray:
     return out
 
 
-@part()
+@part(allocates=True)
 def product_transposed(a: FloatArray, b: FloatArray) -> FloatArray:
     """a·bᵀ, shape (n, m)."""
     out = np.zeros((a.shape[0], b.shape[0]))
@@ -36,7 +36,7 @@ def product_transposed(a: FloatArray, b: FloatArray) -> FloatArray:
     return out
 
 
-@part()
+@part(allocates=True)
 def transposed_product(a: FloatArray, b: FloatArray) -> FloatArray:
     """aᵀ·b, shape (n, m)."""
     out = np.zeros((a.shape[1], b.shape[1]))
@@ -47,7 +47,7 @@ def transposed_product(a: FloatArray, b: FloatArray) -> FloatArray:
     return out
 
 
-@kernel()
+@kernel(allocates=True)
 def times(a: FloatArray, x: FloatArray) -> FloatArray:
     """a·x, shape (n,)."""
     out = np.zeros(a.shape[0])
@@ -73,7 +73,7 @@ def put_identity(out: FloatArray, scale: float) -> None:
             out[i, j] = scale if i == j else 0.0
 
 
-@kernel()
+@kernel(allocates=True)
 def inverse(matrix: FloatArray, out: FloatArray) -> bool:
     """Inverse of a symmetric positive definite matrix into `out`; False if it is singular.
 
@@ -102,7 +102,7 @@ def inverse(matrix: FloatArray, out: FloatArray) -> bool:
     return True
 
 
-@part()
+@part(allocates=True)
 def _invert_factor(lower: FloatArray, scale: FloatArray, out: FloatArray) -> None:
     """D·(L·Lᵀ)⁻¹·D from the factor L and the scale D."""
     n = lower.shape[0]

@@ -157,7 +157,7 @@ def _start(model: FilterModel, state: FilterState, beta: float, signals: FloatAr
     state.counts[0] = 0
 
 
-@part()
+@part(allocates=True)
 def _predict(model: FilterModel, x: FloatArray, p: FloatArray, u: float) -> None:
     ahead = times(model.a, x)
     for i in range(x.size):
@@ -187,7 +187,7 @@ def _measure(state: FilterState, beta: float, signals: FloatArray, y: FloatArray
         state.last[1] = state.high[2]
 
 
-@kernel()
+@kernel(allocates=True)
 def unknown_input_block(
     model: FilterModel,
     state: FilterState,

@@ -97,7 +97,7 @@ _AT = _At()
 HEAD, FILLED, SHARE, OLD, AGO, SINCE_TOLD, MOSTLY = _AT
 
 
-@kernel()
+@kernel(allocates=True)
 def _advance(  # noqa: PLR0917 -- a kernel
     signal: FloatArray,
     code: Codes,
@@ -167,7 +167,7 @@ def _in_force(ages: Ages, window: FloatArray, gains: FloatArray, kept: FloatArra
     return total
 
 
-@part()
+@part(allocates=True)
 def _weigh(ages: Ages, window: FloatArray, rough: float, gains: FloatArray) -> tuple[bool, int]:
     """Add what is gained if each reading from the middle on is old, where some assumption fits.
 

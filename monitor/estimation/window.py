@@ -130,7 +130,7 @@ def solve_two(s: FloatArray) -> tuple[float, float, float]:
     return theta1, theta2, condition
 
 
-@kernel()
+@kernel(allocates=True)
 def windowed_least_squares(
     window: Window, g1: FloatArray, g2: FloatArray, y: FloatArray, theta: FloatArray
 ) -> None:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from monitor.drives import no_edges
 from monitor.model import HealthyLimits
 from monitor.observer.input_lateness import no_lateness
+from monitor.observer.missing_force import high_pass
 from rigwatch.wire.arrays import FloatArray
 
 SHORT, MEDIUM, LONG, LASTING = 8, 32, 128, 256
@@ -35,7 +36,9 @@ OUTPUTS = (
 USUAL_LASTING, USUAL_SHORT, USUAL_MEDIUM, USUAL_FRICTION = range(4)
 """Rows of the healthy residual's extremes at the present motion, see `usual_error.Extremes`."""
 
-ERROR, DRY, WET, LEVEL, DISAGREE, MEASURED, DRIVEN, LATENESS, UNDECIDED, SPEED, LEVELS = range(11)
+(
+    ERROR, DRY, WET, LEVEL, DISAGREE, MEASURED, DRIVEN, LATENESS, UNDECIDED, SPEED, BARE, LEVELS,
+) = range(12)  # fmt: skip
 """Columns of the history; from `LEVELS` on, the levels on which the healthy variance depends."""
 
 
@@ -96,10 +99,15 @@ def new_state(levels: int) -> DecisionState:
     return DecisionState(rows, count, np.zeros(4), lasting, no_lateness(), no_edges())
 
 
+PASSED = np.array([[1.0, 0.0, 0.0]] * 2)
+"""The high-pass of signals that are judged as they are."""
+
+
 class DecisionRules(NamedTuple):
     """Decision thresholds; energies are relative to the healthy variance, see `HealthyLimits`.
 
-    `unseen` is what the limits' energies grow by where a healthy rig's are not known.
+    `unseen` is what the limits' energies grow by where a healthy rig's are not known, `high_pass`
+    numerator and denominator of that of the judged signals, shape (2, 3).
     """
 
     noise: float
@@ -115,14 +123,15 @@ class DecisionRules(NamedTuple):
     patience: int
     lasting: float
     unseen: float = 1.0
+    high_pass: FloatArray = PASSED
 
 
 MARGIN = 1.6
 """Amplitude ratio of a threshold to the largest value of healthy recordings."""
 
 
-def rules_of(limits: HealthyLimits, rate: float) -> DecisionRules:
-    """Rules for a rate [Hz]."""
+def rules_of(limits: HealthyLimits, rate: float, corner: float) -> DecisionRules:
+    """Rules for a rate [Hz], and the corner [Hz] above which signals are judged."""
     energy = MARGIN**2
     return DecisionRules(
         limits.noise,
@@ -138,6 +147,7 @@ def rules_of(limits: HealthyLimits, rate: float) -> DecisionRules:
         round(PATIENCE * rate),
         energy,
         max(limits.unseen**2 / energy, 1.0),
+        np.array(high_pass(corner, rate)),
     )
 
 

@@ -29,8 +29,11 @@ COLUMNS = (
 )  # fmt: skip
 (
     E, DRY_UNIT, VISCOUS_UNIT, PREDICTED, DISAGREE, MEASURED, WEAK, LATE_UNIT, MOVED, UNSURE_INPUT,
-) = range(10)  # fmt: skip
-"""Judged columns: those above, high-passed, and s for what is not known of the inputs' instants."""
+    DRY_BARE, JUDGED,
+) = range(12)  # fmt: skip
+"""Judged columns: those above, high-passed, s for what is not known of the inputs' instants, and g1
+without the high-pass; and their number.
+"""
 WEAKER, LATER = 0.05, 0.5
 """Loss of the inputs of which the response is taken, and their lateness [samples]."""
 
@@ -103,7 +106,7 @@ class HighPassed:
         return out
 
 
-@kernel()
+@kernel(allocates=True)
 def _advance(  # noqa: PLR0917 -- a kernel
     columns: FloatArray,
     z: FloatArray,

@@ -93,8 +93,8 @@ class Observed:
         rows: inputs and motion, shape (n, inputs).
         measured: the measured output, shape (n,).
         predicted: the columns of the prediction.
-        judged: high-passed columns, see `missing_force`, shape (n, 10); the decision corrects the
-            residual for the inputs' edges.
+        judged: high-passed columns, see `missing_force`, shape (n, JUDGED); the decision corrects
+            the residual for the inputs' edges.
         steady: False where an input changes suddenly, stops, or steps between samples at a place
             that is not known yet, shape (n,).
         drive: pace of the first input, see `monitor.drives.Drive`, shape (n,).
@@ -226,7 +226,7 @@ class ObserverSignals:
             )
         )  # fmt: skip
         judged = self._high_passed.update(raw, z, np.stack(changed), state)
-        judged = np.column_stack([judged, steps.unsure * judged[:, LATE_UNIT]])
+        judged = np.column_stack([judged, steps.unsure * judged[:, LATE_UNIT], predicted.dry])
         drives = [own.update(signals[:, place], code) for place, own in enumerate(self._drives)]
         for own in drives:
             steady &= ~own.changed

@@ -20,6 +20,7 @@ from monitor.drives import corrected, edges_unsure, follow_edges, undecided
 from monitor.observer.decision_state import (
     AMPLITUDE,
     ARMING,
+    BARE,
     BEYOND,
     DEPARTED,
     DEVIATION,
@@ -72,7 +73,7 @@ from monitor.observer.input_lateness import (
     unsure_lateness,
 )
 from monitor.observer.lagged_motion import EMPTY, FIRST, TAINTED
-from monitor.observer.missing_force import LATE_UNIT, MOVED, UNSURE_INPUT, E
+from monitor.observer.missing_force import DRY_BARE, LATE_UNIT, MOVED, UNSURE_INPUT, E
 from monitor.observer.window_statistics import (
     drive_explains,
     dry_force,
@@ -233,7 +234,7 @@ def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatA
     kept.rows[head, ERROR] = row[ERROR] - late
     unsure = UNSURE * unsure_lateness(kept.lateness) * row[LATE_UNIT]
     kept.rows[head, LATENESS] = np.hypot(unsure, row[UNSURE_INPUT])
-    kept.rows[head, SPEED] = speed
+    kept.rows[head, SPEED], kept.rows[head, BARE] = speed, row[DRY_BARE]
     kept.rows[head, UNDECIDED] = undecided(row[MOVED], kept.edges)
     for c in range(levels.size):
         kept.rows[head, LEVELS + c] = levels[c]
@@ -399,7 +400,7 @@ def _verdict(
     since = count[ONSET]
     length = min(since + SHORT, LONG)
     beside, _, _, share, dry = friction(kept, length, spread)
-    force, acting = dry_force(kept, since, length)
+    force, acting = dry_force(kept, since, length, rules.high_pass)
     out[SHARE, k], out[DRY_SHARE, k] = share, dry
     least = LEFT_EARLY if length < MEDIUM else LEFT
     fits = share > FITS and dry > DRY_PART and force > 0.0 and beside > least * force

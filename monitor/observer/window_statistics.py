@@ -6,6 +6,7 @@
 import numpy as np
 
 from monitor.observer.decision_state import (
+    BARE,
     DRIVEN,
     DRY,
     ERROR,
@@ -16,6 +17,8 @@ from monitor.observer.decision_state import (
     WET,
     DecisionState,
 )
+from rigwatch.physics.transfer import filter_sample
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import part
 
 HEAD, FILLED, WAS_JUDGING, LASTED = 0, 1, 12, 13
@@ -63,10 +66,15 @@ def lasting_energy(kept: DecisionState, allowed: float) -> float:
 def _slides(kept: DecisionState, ago: int) -> bool:
     """Whether the motion has kept its direction long enough for real friction to change sign.
 
-    Contacts deform before they slide, and sensors are delayed.
+    Contacts deform before they slide, and sensors are delayed. The other way round, strong friction
+    bends the speed where it reverses, and smoothing delays the reversal of a bent speed, so that
+    the force has changed sign in the sample before: neither counts one that the speed, going on as
+    it does, would be reversed after.
     """
     head = kept.counts[HEAD]
     speed = kept.rows[(head - ago) % HISTORY, SPEED]
+    if speed * (2.0 * speed - kept.rows[(head - ago - 1) % HISTORY, SPEED]) <= 0.0:
+        return False
     for before in range(1, RISING + 1):
         if speed * kept.rows[(head - ago - before) % HISTORY, SPEED] <= 0.0:
             return False
@@ -111,7 +119,9 @@ def friction(
 
 
 @part()
-def dry_force(kept: DecisionState, surely: int, length: int) -> tuple[float, float]:
+def dry_force(
+    kept: DecisionState, surely: int, length: int, high_pass: FloatArray
+) -> tuple[float, float]:
     """Force of dry friction alone [N], over a window and over the part of it in which it acts.
 
     A steady motion hardly distinguishes viscous friction from it, and a joint fit would assign to
@@ -123,17 +133,40 @@ def dry_force(kept: DecisionState, surely: int, length: int) -> tuple[float, flo
         kept: the window's rows.
         surely: newest samples in which friction acts, if it does.
         length: of the window [samples].
+        high_pass: of the judged signals, see `DecisionRules`.
     """
     n = min(length, kept.counts[FILLED])
     a = p = most = acting = 0.0
+    start = n
     for ago in range(1, n + 1):
         if _slides(kept, ago):
             row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
             a += row[DRY] * row[DRY]
             p += row[DRY] * row[ERROR]
         if ago >= min(surely, n) and a > 0.0 and p * abs(p) > most * a:
-            most, acting = p * p / a, p / a
+            most, acting, start = p * p / a, p / a, ago
+    if most > 0.0 and surely < n:
+        acting = _force_since(kept, start, high_pass)
     return p / a if a > 0.0 else 0.0, acting
+
+
+@part(allocates=True)
+def _force_since(kept: DecisionState, start: int, high_pass: FloatArray) -> float:
+    """Force of dry friction that begins with the sample `start` ago [N].
+
+    A high-passed force that reverses is twice the step with which one begins that was not there:
+    compared with the response to friction that has always acted, friction that has just begun
+    would appear half as large until the high-pass has forgotten.
+    """
+    a = p = 0.0
+    state = np.zeros(high_pass.shape[1] - 1)
+    for ago in range(start, 0, -1):
+        row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
+        unit = filter_sample(high_pass[0], high_pass[1], state, row[BARE])
+        if _slides(kept, ago):
+            a += unit * unit
+            p += unit * row[ERROR]
+    return p / a if a > 0.0 else 0.0
 
 
 @part()

@@ -73,6 +73,8 @@ class ObserverMonitor:
         self._follow(model)
 
     def _follow(self, model: RigModel) -> None:
+        plant = model.plant
+        assert isinstance(plant, EquationsPlant)
         assert model.healthy is not None
         assert model.motion_range is not None
         layout = self._signals.layout
@@ -84,7 +86,7 @@ class ObserverMonitor:
         self._since = 0
         self._recorded = RecordedDrives(model.healthy.steady_drive_energies)
         self._usual = UsualError(model.healthy, model.sample_rate)
-        self.rules = d.rules_of(model.healthy, model.sample_rate)
+        self.rules = d.rules_of(model.healthy, model.sample_rate, plant.corner)
         self._clipping = Clipping(model)
 
     def update(self, block: SampleBlock) -> Result | None:

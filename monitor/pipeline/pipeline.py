@@ -172,7 +172,8 @@ class Monitor:
         data = self._columns(admitted.signals[begin:end], code, seq)
         reset[begin:end] = self._residual.reset
         self._promoted.add(data, code)
-        part = np.zeros((w.OUTPUTS, end - begin))
+        whole = end - begin == out.shape[1]
+        part = out if whole else np.zeros((w.OUTPUTS, end - begin))
         watch_block(
             data,
             code,
@@ -184,7 +185,8 @@ class Monitor:
             self._state,
             part,
         )
-        out[:, begin:end] = part
+        if not whole:
+            out[:, begin:end] = part
 
     def _columns(self, signals: FloatArray, code: Codes, seq: Codes) -> FloatArray:
         if isinstance(self._residual, InertiaResidual):

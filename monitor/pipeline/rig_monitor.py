@@ -22,7 +22,7 @@ from monitor.pipeline.pipeline import Monitor
 from monitor.pipeline.result import Result
 from monitor.pipeline.steady_kernel import Outputs
 from monitor.signals import GAP, SENSOR_CLIPPED, SENSOR_INVALID, Condition, above
-from monitor.wiring import WIRING, WiringCheck
+from monitor.wiring import DRIVE, WIRING, WiringCheck
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kept_state import KeptState
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock, cut
@@ -73,8 +73,9 @@ class RigMonitor:
         self._pipeline = scheme_of(model)
         self._detectors = tuple(detectors)
         self._sensors = SensorFlags(model.sample_rate)
-        checked = any(settings_of(name, settings or {}).enabled for name in WIRING)
-        self._wiring = WiringCheck(model) if checked else None
+        checked = {name for name in WIRING if settings_of(name, settings or {}).enabled}
+        # Who has said that the sensors are as they are to be is not asked for the drive.
+        self._wiring = WiringCheck(model, drive=DRIVE in checked) if checked - {DRIVE} else None
 
     def update(self, block: SampleBlock) -> Watched | None:
         """Process the next block; None if it contains nothing new.
@@ -127,7 +128,7 @@ class RigMonitor:
         at = self._pipeline.passed(block, published)
         if not out.holds[place] and self.alarms.is_idle:
             if self._wiring is not None:
-                self._wiring.update(block)
+                self._wiring.update(block, at)
             return at, ()
         outputs = out.columns[place], out.reset[place], out.clipping[place]
         return self._completed(Result(at, self._pipeline.steady_conditions(*outputs)), block)
@@ -146,7 +147,7 @@ class RigMonitor:
             own = tuple(c for c in own if c.name.partition(".")[0] in OF_SAMPLES)
         if self._wiring is None:
             return at, (*own, *more, *quality)
-        wrong, wiring = self._wiring.update(fresh)
+        wrong, wiring = self._wiring.update(fresh, at)
         wiring = (*wiring, *self._wiring_put_right(wiring, len(fresh)))
         if wrong is not None and wrong.any():
             at = replace(at, columns=tuple(_disarmed(column, wrong) for column in at.columns))
@@ -189,7 +190,7 @@ class RigMonitor:
             return
         self._sensors.update(_fresh(block, result.estimates))
         if self._wiring is not None:
-            self._wiring.update(_fresh(block, result.estimates))
+            self._wiring.update(_fresh(block, result.estimates), result.estimates)
 
 
 def _fresh(block: SampleBlock, judged: EstimateBlock) -> SampleBlock:

@@ -112,7 +112,7 @@ def judge_steady(  # noqa: PLR0917
         )
 
 
-@part()
+@part(allocates=True)
 def _judge(  # noqa: PLR0917
     state: SteadyState,
     values: FloatArray,

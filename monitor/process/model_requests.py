@@ -91,6 +91,7 @@ class ModelDesk:
         try:
             request = json_value(question, ModelRequest)
         except JsonError as error:
+            self._check.refuse()
             return [msgspec.json.encode(ModelReply(False, f"not a model request: {error}"))]
         verdict = self._check.judge(request)
         if verdict.refusal:

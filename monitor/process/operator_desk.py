@@ -24,7 +24,7 @@ class OperatorDesk:
     @property
     def counters(self) -> dict[str, float]:
         """Commands refused because of their sender, and commands lost in a flood."""
-        lost = self._commands.dropped + self._commands.rejected
+        lost = self._commands.dropped + self._commands.rejected + self._commands.refused
         return {"commands_refused": float(self._check.refused), "commands_lost": float(lost)}
 
     def execute(self, alarms: AlarmManager, now_ns: int) -> Iterator[list[Announcement]]:

@@ -39,7 +39,7 @@ def learn_aperiodic(ref: Reference, rules: ReferenceRules, row: FloatArray) -> N
         _arm_aperiodic(ref, rules.learn)
 
 
-@part()
+@part(allocates=True)
 def _arm_aperiodic(ref: Reference, length: int) -> None:
     """Arm for an aperiodic drive; limits come from stretches of `length` samples."""
     total, learnt = np.zeros(4), ref.counts.learnt

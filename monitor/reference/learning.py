@@ -246,7 +246,7 @@ def _learn(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> 
         _finish_learning(ref, rules, wanted // period)
 
 
-@part()
+@part(allocates=True)
 def _finish_learning(ref: Reference, rules: ReferenceRules, depth: int) -> None:
     """Compute averages, amplitude scale and scatter; restart if the rig has not settled."""
     counts, levels, period = ref.counts, ref.levels, ref.counts.period

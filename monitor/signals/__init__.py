@@ -47,7 +47,7 @@ from monitor.signals.residual import (
     advance_filters,
     modelled_acceleration,
 )
-from monitor.signals.small_rows import copy, fill, fill_rows, push
+from monitor.signals.small_rows import copy, copy_rows, fill, fill_rows, push
 
 __all__ = [
     "ACCELERATION",
@@ -91,6 +91,7 @@ __all__ = [
     "commission_inertia",
     "conditions",
     "copy",
+    "copy_rows",
     "fill",
     "fill_rows",
     "level",

@@ -194,7 +194,7 @@ def _find_good(values: FloatArray, flags: ByteArray, padding: int, good: NDArray
                 values[k, c] = 0.0
 
 
-@kernel()
+@kernel(allocates=True)
 def admit_steady(  # noqa: PLR0917
     state: SteadyAdmission,
     values: FloatArray,

@@ -23,7 +23,7 @@ import numpy as np
 
 from monitor.model import RigModel, TransferPlant
 from monitor.signals.admission import DEAD, GOOD, HELD, LARGEST, NEW_BOOT, RESTART, Codes
-from monitor.signals.small_rows import copy, fill, fill_rows
+from monitor.signals.small_rows import copy, copy_rows, fill, fill_rows
 from rigwatch.physics.transfer import TransferFunction, filter_sample, velocity_filter
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kernel import kernel, part
@@ -143,8 +143,7 @@ def _copy(source: _States, to: _States) -> None:
     copy(source.velocity, to.velocity)
     copy(source.sign, to.sign)
     copy(source.speed, to.speed)
-    for i in range(source.late.shape[0]):
-        copy(source.late[i], to.late[i])
+    copy_rows(source.late, to.late)
 
 
 @part()
@@ -175,7 +174,7 @@ def _filter(readings: FloatArray, missing: bool, f: Filters, out: FloatArray) ->
     out[6] = filter_sample(f.friction_b, f.friction_a, state.speed, speed)
 
 
-@part()
+@part(allocates=True)
 def _pass_gap(readings: FloatArray, usual: FloatArray, f: Filters) -> None:
     """Pass the missing samples again, now that `readings` after them are known."""
     count, unused, between = f.missing[0], np.zeros(7), np.zeros(3)

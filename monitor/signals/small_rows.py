@@ -33,6 +33,13 @@ def copy(source: FloatArray, to: FloatArray) -> None:
 
 
 @part()
+def copy_rows(source: FloatArray, to: FloatArray) -> None:
+    """Copy several rows to others, both of shape (m, n)."""
+    for i in range(source.shape[0]):
+        copy(source[i], to[i])
+
+
+@part()
 def push(row: FloatArray, newest: float) -> None:
     """Move every entry of a row, shape (n,), one place to the front, and append the newest."""
     for i in range(row.size - 1):

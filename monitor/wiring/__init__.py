@@ -1,9 +1,9 @@
-"""Wiring check: whether position and acceleration show one and the same motion.
+"""Wiring check: whether position and acceleration show one and the same motion, as the drive asks.
 
 At the monitor's start (`WiringCheck`), and of recordings that a model is made of.
 """
 
 from monitor.wiring.recorded_wiring import check_recorded
-from monitor.wiring.wiring_check import WIRING, WiringCheck
+from monitor.wiring.wiring_check import DRIVE, WIRING, WiringCheck
 
-__all__ = ["WIRING", "WiringCheck", "check_recorded"]
+__all__ = ["DRIVE", "WIRING", "WiringCheck", "check_recorded"]

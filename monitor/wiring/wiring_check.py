@@ -1,20 +1,23 @@
 """Checks the wiring over the first seconds of motion, before anything is judged.
 
-    samples ─▶ windows of one second ─▶ motion ratio ─▶ passed
-                                                     └▶ failed, after two windows in a row
+    samples ─▶ windows of one second ─▶ motion ratio ─▶ drive ratio ─▶ passed
+                                             └───────────────┴▶ failed, after two windows in a row
 
-One good window passes until the device or the monitor starts again. After a failure nothing is
-judged until then: a reference learned with wrong wiring would count as healthy. From the first bad
-window on nothing is judged either, until a good one; it takes the second to be told.
+The drive is compared where a transfer function predicts the acceleration from it; the reference,
+which is learned later, hides a difference. One good window passes until the device or the
+monitor starts again. After a failure nothing is judged until then: a reference learned with wrong
+wiring would count as healthy. From the first bad window on nothing is judged either, until a good
+one; it takes the second to be told.
 """
 
 import numpy as np
 
-from monitor.model import RigModel
+from monitor.model import RigModel, TransferPlant
 from monitor.signals import Condition, above, usable
+from monitor.wiring.drive_ratio import drive_ratio
 from monitor.wiring.motion_ratio import MotionRatio, motion_ratio
 from rigwatch.wire.arrays import BoolArray, FloatArray
-from rigwatch.wire.messages import SampleBlock
+from rigwatch.wire.messages import EstimateBlock, SampleBlock
 
 WINDOW = 1.0
 """Length of a window [s]."""
@@ -26,8 +29,14 @@ REVERSED = 15.0
 """Largest deviation of a reversed sensor's phase from 180° [deg]; beyond that, swapped
 channels are equally likely.
 """
+DRIVE_GAIN = 5.0
+"""Largest factor by which a rig may answer its drive otherwise than its model does: other drives,
+friction and faults leave 0.55 to 1.4 on the simulated rig and on one simulated by others; units
+differ by ten or more.
+"""
 SIGN, SCALE, SWAPPED = "wiring_sign", "wiring_scale", "wiring_swapped"
-WIRING = (SIGN, SCALE, SWAPPED)
+DRIVE = "wiring_drive"
+WIRING = (SIGN, SCALE, SWAPPED, DRIVE)
 
 
 class WiringCheck:
@@ -35,26 +44,33 @@ class WiringCheck:
 
     Args:
         model: of the rig.
+        drive: whether the drive is compared, too.
     """
 
-    def __init__(self, model: RigModel) -> None:
+    def __init__(self, model: RigModel, *, drive: bool = True) -> None:
         self._rate, self._channels = model.sample_rate, model.channels
+        self._drive = drive and isinstance(model.plant, TransferPlant)
+        self._noise = model.noise.residual
         self._length = round(WINDOW * model.sample_rate)
         self._boot = self._next = -1
         self._restart()
 
     def _restart(self) -> None:
-        self._passed, self._failed, self._fails = False, "", 0
+        self._passed = self._sensors_agree = False
+        self._failed, self._fails = "", 0
         self._window: list[FloatArray] = []
-        self._gain = self._phase = np.nan
+        self._gain = self._phase = self._ratio = np.nan
 
-    def update(self, block: SampleBlock) -> tuple[BoolArray | None, tuple[Condition, ...]]:
+    def update(
+        self, block: SampleBlock, at: EstimateBlock
+    ) -> tuple[BoolArray | None, tuple[Condition, ...]]:
         """Whether the wiring is in doubt or wrong at each sample, shape (n,), and conditions.
 
         None once it has passed: none of the samples is in doubt.
 
         Args:
             block: new samples; a gap before it discards the window.
+            at: their estimates.
         """
         if block.boot != self._boot:
             self._restart()
@@ -64,13 +80,14 @@ class WiringCheck:
         if self._passed:
             return None, ()
         doubted, wrong = np.zeros((2, len(block)), np.bool_)
-        wrong[self._first_failed(block, doubted) :] = True
+        wrong[self._first_failed(block, at, doubted) :] = True
         return doubted | wrong, tuple(
             above(name, wrong & (name == self._failed), np.full(len(block), value), limit)
             for name, value, limit in (
                 (SIGN, abs(self._phase), 180 - REVERSED),
                 (SCALE, self._gain, GAIN),
                 (SWAPPED, abs(self._phase), PHASE),
+                (DRIVE, self._ratio, DRIVE_GAIN),
             )
             if self._failed == name
         )
@@ -79,51 +96,69 @@ class WiringCheck:
         """Whether no sample of a block is in doubt, as the wiring has passed."""
         return self._passed and block.boot == self._boot
 
-    def _first_failed(self, block: SampleBlock, doubted: BoolArray) -> int:
+    def _first_failed(self, block: SampleBlock, at: EstimateBlock, doubted: BoolArray) -> int:
         """The first sample at which the wiring counts as wrong; the block's length if none.
 
         `doubted` is set where the last window was bad.
         """
         if self._failed:
             return 0
-        signals = self._signals(block)
+        signals = self._signals(block, at)
         if signals is None:
             self._passed = True
             return len(block)
         known: BoolArray = np.isfinite(signals.sum(axis=1))
-        for at, valid in enumerate(known):
-            doubted[at] = self._fails > 0
+        for n, valid in enumerate(known):
+            doubted[n] = self._fails > 0
             if not valid:
                 self._window = []
                 continue
-            self._window.append(signals[at])
+            self._window.append(signals[n])
             if len(self._window) == self._length:
                 self._judge(np.array(self._window))
                 self._window = []
-                doubted[at] = self._fails > 0
+                doubted[n] = self._fails > 0
                 if self._passed or self._failed:
-                    return len(block) if self._passed else at
+                    return len(block) if self._passed else n
         return len(block)
 
-    def _signals(self, block: SampleBlock) -> FloatArray | None:
-        """Position and acceleration, NaN where invalid, shape (n, 2); None without such a pair."""
+    def _signals(self, block: SampleBlock, at: EstimateBlock) -> FloatArray | None:
+        """Position, acceleration and, where it is compared, the modelled acceleration.
+
+        NaN where invalid, shape (n, 2 or 3); None without such a pair.
+        """
         known = [column for column in block.channels if column.name in self._channels]
         pair = [[c for c in known if c.unit == unit] for unit in ("m", "m/s^2")]
         if any(len(found) != 1 for found in pair):
             return None
         columns = [found[0] for found in pair]
-        return np.stack(
-            [np.where(usable(c, stuck_counts=True), c.values, np.nan) for c in columns], axis=1
-        )
+        read = [np.where(usable(c, stuck_counts=True), c.values, np.nan) for c in columns]
+        if self._drive:
+            read.append(at.column("modelled_acceleration").values)
+        return np.stack(read, axis=1)
 
     def _judge(self, window: FloatArray) -> None:
         found = motion_ratio(window[:, 0], window[:, 1], self._rate)
         if found is None:
             return
-        reason = wrong_wiring(found)
+        reason: str | None = "" if self._sensors_agree else wrong_wiring(found)
+        self._sensors_agree = not reason
+        if self._drive and not reason:
+            reason = self._wrong_drive(window)
+        if reason is None:
+            self._fails = 0
+            return
         self._passed, self._fails = not reason, self._fails + 1 if reason else 0
         if self._fails == FAILURES:
             self._failed, self._gain, self._phase = reason, found.gain, found.phase
+
+    def _wrong_drive(self, window: FloatArray) -> str | None:
+        """What is wrong with the drive, "" if nothing is; None if the window cannot tell."""
+        ratio = drive_ratio(window[:, 1], window[:, 2], self._noise)
+        if ratio is None:
+            return None
+        self._ratio = ratio
+        return "" if 1 / DRIVE_GAIN < ratio < DRIVE_GAIN else DRIVE
 
 
 def wrong_wiring(found: MotionRatio) -> str:

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 from rigwatch.commands.any_text import write_any_text
 from rigwatch.commands.unwinding import unwound_at_signal
 from rigwatch.version import __version__
-from rigwatch.wire.errors import RigwatchError, reason_of
+from rigwatch.wire.errors import RigwatchError, nearest, reason_of
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
@@ -91,6 +91,7 @@ def _run(given: Sequence[str]) -> int:
     """Run a command; returns the exit code."""
     try:
         _refuse_undecodable(given)
+        _refuse_unknown([word for word in given if not word.startswith("-")], COMMANDS)
         try:
             arguments = _parser(given).parse_args(given)
         except SystemExit:
@@ -123,6 +124,16 @@ def _refuse_undecodable(given: Sequence[str]) -> None:
     for argument in given:
         if any("\ud800" <= letter <= "\udfff" for letter in argument):
             raise RigwatchError(f"{argument!r}: found bytes that are not UTF-8, expected UTF-8")
+
+
+def _refuse_unknown(words: Sequence[str], table: Mapping[str, str]) -> None:
+    """Name the command that was meant; argparse would list all of them."""
+    if not words or not table:
+        return
+    name, *others = words
+    if name not in table:
+        raise RigwatchError(f"found command {name!r}{nearest(name, table)}")
+    _refuse_unknown(others, _actions(_module(table[name])))
 
 
 def every_command(

@@ -42,7 +42,7 @@ def ensure_model(config: Path, folder: Path, say: Callable[[str], None]) -> Path
     model, stamp = folder / MODEL, folder / "model.made-from"
     made_from = _made_from(config)
     if model.is_file() and stamp.is_file() and stamp.read_text(encoding="utf-8") == made_from:
-        say(f"model of the rig: {relative(model)}, made in an earlier run")
+        say(f"model of the healthy rig: {relative(model)}, made before and up to date")
         return model
     say("commissioning: first the monitor learns how the healthy rig moves, as on a real rig:")
     say("  three recordings, and a model: a file that says how the healthy rig answers its drive")

@@ -7,7 +7,9 @@ the monitor finds to be missing in its model.
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from math import inf, isinf
 
+from rigwatch.demo.verdict import ALARM
 from rigwatch.wire.messages import PROBABLY_MISSING, Alarm, Event
 from sim_plant.scenario import Scenario
 
@@ -20,6 +22,8 @@ WHY_LATER = "later than the alarm: every known effect is compared with two secon
 ENDED = ("normal", "cleared_unacknowledged")
 NAMELESS = "departure"
 """The alarm that reports a fault without naming it."""
+AFTER_EXPLAINED = 8.0
+"""Time from the naming of dry friction to the end if its cause is told by then [s]."""
 OF_THE_RIG = (NAMELESS, "dry_friction", "stiction", "other_fault")
 """Alarms that answer to what is done to the rig; others are about its measuring chain."""
 
@@ -56,13 +60,19 @@ class Narrator:
         scenario: the changes to the rig.
         say: called with each line.
         rig: the rig's configuration, for the commands that people are told.
+        attended: people watch, so commands that a running rig answers are told.
 
     Attributes:
         alarms: raised so far.
+        explained: whether the monitor has said what its model lacks.
     """
 
-    def __init__(self, scenario: Scenario, say: Callable[[str], None], rig: str) -> None:
+    def __init__(
+        self, scenario: Scenario, say: Callable[[str], None], rig: str, *, attended: bool = True
+    ) -> None:
         self.alarms: list[Alarm] = []
+        self.explained = False
+        self._attended = attended
         self._say, self._config = say, rig
         self._rate = scenario.plant.sample_rate
         self._acts = acts(scenario)
@@ -83,6 +93,18 @@ class Narrator:
     def fault_begun(self) -> bool:
         """Whether the first fault has begun."""
         return self._last is not None
+
+    def all_told_at(self, after_named: float) -> float:
+        """Rig time at which a run that nobody watches may end [s].
+
+        Args:
+            after_named: longest time from the naming of dry friction; infinite for a run that is
+                watched [s].
+        """
+        named = [alarm.seq for alarm in self.alarms if alarm.name == ALARM]
+        if not named or isinf(after_named):
+            return inf
+        return named[0] / self._rate + (AFTER_EXPLAINED if self.explained else after_named)
 
     def begin(self, seq: int) -> None:
         """Say that faults are planned, and how long after this sample the first comes."""
@@ -111,22 +133,29 @@ class Narrator:
         if alarm.state == "unacknowledged":
             if self._ended is not None and alarm.onset_seq <= self._ended.onset_seq:
                 self._ended = None  # the fault persists, under its name
-            self.alarms.append(alarm)
             self._say(f"{self._time(alarm.seq)} ALARM: {alarm.cause}{self._delay(alarm)}")
             if alarm.name not in OF_THE_RIG:
                 self._say("            (about the measuring chain: none of the faults announced)")
-            self._say(f"            what to do: {alarm.guidance_for(self._config)}")
-            if alarm.name != NAMELESS:
-                self._say(f"            all alarms: $ rigwatch alarms {self._config}")
+            self._advise(alarm)
+            self.alarms.append(alarm)
         elif alarm.name in {told.name for told in self.alarms} and alarm.state in ENDED:
             self._tell_end()
             self._ended = alarm
             if alarm.name != NAMELESS:
                 self._tell_end()
 
+    def _advise(self, alarm: Alarm) -> None:
+        """Say once for each name what to do, and once where all alarms are listed."""
+        told = {earlier.name for earlier in self.alarms}
+        if alarm.name not in told:
+            self._say(f"            what to do: {alarm.guidance_for(self._config)}")
+        if self._attended and alarm.name != NAMELESS and told <= {NAMELESS}:
+            self._say(f"            all alarms: $ rigwatch alarms {self._config}")
+
     def explain(self, event: Event) -> None:
         """Report which effect the monitor finds to be missing in its model since an alarm."""
         if event.code == PROBABLY_MISSING:
+            self.explained = True
             found = event.text.rpartition("probably missing: ")[2]
             self._say(f"            probably missing in the rig's model: {found}")
             self._say(f"            ({WHY_LATER})")
@@ -145,7 +174,7 @@ class Narrator:
 
     def _tell_how_to_acknowledge(self, ended: Alarm) -> None:
         """Say that an alarm stands until somebody has seen it, and the command for that."""
-        if ended.state == "cleared_unacknowledged":
+        if self._attended and ended.state == "cleared_unacknowledged":
             self._say("            the alarm is kept until somebody says that it was seen:")
             self._say(f"              $ rigwatch ack {self._config} {ended.name}")
 

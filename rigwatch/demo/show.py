@@ -15,7 +15,7 @@ from typing import Any
 
 from rigwatch.demo.narrator import Narrator
 from rigwatch.demo.rig_file import relative
-from rigwatch.demo.verdict import ALARM, Recording, complaints, read_recording
+from rigwatch.demo.verdict import Recording, complaints, read_recording
 from rigwatch.recorder import newest
 from rigwatch.wire.bus import connect, unique_process
 from rigwatch.wire.errors import DeviceError
@@ -35,6 +35,8 @@ from sim_plant.scenario import load_scenario
 
 START_TIMEOUT = 180.0
 STOP_TIMEOUT = 60.0
+SUCCEEDED = "the demo succeeded: the friction was named, and every sample is in the recording"
+UNEXPLAINED = "  (it ended before the monitor had said what is missing in the rig's model)"
 GO_ON = (
     "on to your own machine (README.md, Your own machine):",
     "  models, which are equations to be fitted:  rigwatch model list",
@@ -84,14 +86,17 @@ class Show:
         rig: configuration of the rig.
         folder: its files.
         say: called with lines for people.
+        attended: people watch until they end it, and can give commands.
     """
 
-    def __init__(self, rig: Path, folder: Path, say: Callable[[str], None]) -> None:
+    def __init__(
+        self, rig: Path, folder: Path, say: Callable[[str], None], *, attended: bool = True
+    ) -> None:
         self._rig, self._folder, self._say = rig, folder, say
         self._config = load_rig(rig)
         assert self._config.plant is not None
         scenario = load_scenario(self._config.plant.scenario)
-        self._narrator = Narrator(scenario, say, relative(self._rig))
+        self._narrator = Narrator(scenario, say, relative(self._rig), attended=attended)
         self._first = self._seen = 0
         self._up: subprocess.Popen[str] | None = None
 
@@ -100,7 +105,8 @@ class Show:
 
         Args:
             seconds: longest rig time; Ctrl-C ends it too [s].
-            after_named: time from the naming of dry friction to the end [s].
+            after_named: longest time from the naming of dry friction to the end, which comes
+                earlier if the monitor has said what its model lacks [s].
         """
         self._say(f"starting the rig: $ rigwatch up {relative(self._rig)}")
         if activate := not_activated():
@@ -127,7 +133,7 @@ class Show:
         rate = self._config.rig.sample_rate
         give_up = time.monotonic() + START_TIMEOUT
         try:
-            while self._seen < min(seconds, self._named_at() + after_named) * rate:
+            while self._seen < min(seconds, self._narrator.all_told_at(after_named)) * rate:
                 self._check_running(give_up)
                 alarm: Alarm | None = alarms.get(timeout=0.1)
                 # A missing device is not reported before the simulated device is up.
@@ -145,11 +151,6 @@ class Show:
                     give_up = time.monotonic() + START_TIMEOUT
         finally:
             bus.close()
-
-    def _named_at(self) -> float:
-        """Rig time at which dry friction was named, infinite before [s]."""
-        named = [alarm.seq for alarm in self._narrator.alarms if alarm.name == ALARM]
-        return named[0] / self._config.rig.sample_rate if named else float("inf")
 
     def _take(self, blocks: list[SampleBlock]) -> None:
         if not self._seen:
@@ -205,7 +206,11 @@ class Show:
         session = relative(recording.path)
         self._say(f"recording: {session}, {recording.samples} samples ({seconds:.0f} s), {whole}")
         for complaint in found:
-            self._say(f"demo: {complaint}")
+            self._say(f"the demo did not succeed: {complaint}")
+        if not found:
+            self._say(SUCCEEDED)
+            if not self._narrator.explained:
+                self._say(UNEXPLAINED)
         self._say(f"look into it:  rigwatch info {session}")
         self._say(f"replay it:     rigwatch replay {session}")
         self._say("               (the same monitor over the recording; it finds the same)")

@@ -46,7 +46,8 @@ class Authority:
             key = serialization.load_pem_private_key((folder / AUTHORITY_KEY).read_bytes(), None)
         except (OSError, ValueError) as error:
             why = reason_of(error)
-            raise KeysError(f"{folder}: no authority here: {why}; `rigwatch keys new`") from None
+            made = f"make one with `rigwatch keys new {folder}`"
+            raise KeysError(f"{folder}: found no authority ({why}); {made}") from None
         assert isinstance(key, ec.EllipticCurvePrivateKey)
         self._key = key
 

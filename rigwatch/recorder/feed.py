@@ -106,6 +106,11 @@ class Feed:
         """Messages, other than samples, dropped because the recorder was slow."""
         return sum(item.dropped for item in self._others)
 
+    @property
+    def refused(self) -> int:
+        """Messages of clients that sent more than their share."""
+        return sum(item.refused for item in self._others)
+
     def close(self) -> None:
         """Stop receiving."""
         self._reader.close()

@@ -31,6 +31,8 @@ LONGEST_BREAK = 120.0
 """Interruption after which a recorder starts a new session [s]."""
 
 
+_SECOND_NS = 1_000_000_000
+_FORMAT = "%Y%m%dT%H%M%SZ"
 _STAMP = re.compile(r"\d{8}T\d{6}Z(-\d+)?")
 
 
@@ -94,13 +96,28 @@ def choose(root: Path, run: RunInfo, longest_break: float = LONGEST_BREAK) -> Pl
     before = _interrupted(root, run)
     if before is not None and abs(run.t_ns - before.ended_ns) <= longest_break * 1e9:
         return before.place
-    stamp = datetime.fromtimestamp(run.t_ns // 1_000_000_000, UTC).strftime("%Y%m%dT%H%M%SZ")
-    folder = _unused(root / f"{run.rig}-{stamp}")
+    folder = new_folder(root, run)
     if before is None and math.isfinite(longest_break):
         return _just_ended(folder, root, run)
     if before is None or before.stopped:
         return Place(folder)
     return Place(folder, before.place.last, before.place.positions)
+
+
+def new_folder(root: Path, run: RunInfo) -> Path:
+    """The folder of a session that begins at `run.t_ns`."""
+    stamp = datetime.fromtimestamp(run.t_ns // _SECOND_NS, UTC).strftime(_FORMAT)
+    return _unused(root / f"{run.rig}-{stamp}")
+
+
+def age_of(folder: Path, run: RunInfo) -> float:
+    """Age at `run.t_ns` of the session in a folder, by its name; 0 if that is no time [s]."""
+    stamp = folder.name.removeprefix(f"{run.rig}-").partition("Z")[0] + "Z"
+    try:
+        began = datetime.strptime(stamp, _FORMAT).replace(tzinfo=UTC)
+    except ValueError:
+        return 0.0
+    return run.t_ns / _SECOND_NS - began.timestamp()
 
 
 def _unused(folder: Path) -> Path:

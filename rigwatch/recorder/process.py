@@ -3,6 +3,7 @@
 python -m rigwatch.recorder CONFIG
 """
 
+import contextlib
 import hashlib
 import math
 import threading
@@ -12,14 +13,16 @@ from pathlib import Path
 
 from rigwatch.recorder.disk import DiskWatch
 from rigwatch.recorder.feed import Feed
-from rigwatch.recorder.folders import LONGEST_BREAK, choose, note_last
+from rigwatch.recorder.folders import LONGEST_BREAK, age_of, choose, new_folder, note_last
 from rigwatch.recorder.past import PastServer
 from rigwatch.recorder.positions import PositionFile, Positions
 from rigwatch.recorder.remote_feed import RemoteFeed
 from rigwatch.recorder.resuming import of_living
 from rigwatch.recorder.retention import Retention
+from rigwatch.recorder.session_length import SessionLength
 from rigwatch.recorder.store import Store
 from rigwatch.wire.bus import Bus, joined
+from rigwatch.wire.errors import SessionError
 from rigwatch.wire.host import Heartbeat, Kept, Pulse, free_share, use_few_pools
 from rigwatch.wire.messages import (
     ALARMS,
@@ -59,7 +62,8 @@ class Recorder:
         place = of_living(bus, place) if place.changed else place
         self.store = Store(place.folder, run, self.settings.segment)
         self.feed = RemoteFeed(bus, place) if remote else Feed(bus, place.last, place.positions)
-        self._bus = bus
+        self._bus, self._run = bus, run
+        self._length = SessionLength(self.settings.session_days, age_of(place.folder, run))
         self._settled = self._noted = 0
         self._disk = DiskWatch()
         self._retention = Retention(self.settings, config.rig.id)
@@ -76,6 +80,8 @@ class Recorder:
         for message in self.feed.take():
             self.store.add(message)
         self._flush(now, t_ns)
+        if self._length.is_over(now) and not self.store.failure:
+            self._begin_session(now, t_ns)
         share = free_share(self.store.folder)
         self._tell(self._disk.update(share, t_ns))
         due = now - self._told_at >= HEALTH_EVERY
@@ -95,9 +101,21 @@ class Recorder:
         self._note_segment()
         if not self.store.failure:
             self._settled = t_ns - UNSETTLED_NS
-        if not self.store.failure and taken != self._kept:
+        # Without a segment there is no folder yet.
+        if not self.store.failure and self.store.segment_count and taken != self._kept:
             self._kept = taken
             self._positions.save(taken)
+
+    def _begin_session(self, now: float, t_ns: int) -> None:
+        """Go on in another folder; all that was taken is in the one before."""
+        self._length.begin(now)
+        self._run = replace(self._run, t_ns=t_ns)
+        folder = new_folder(Path(self.settings.folder), self._run)
+        with contextlib.suppress(SessionError):  # without an index, the segment is still read
+            self.store.move_to(folder, self._run)
+        self._positions, self._kept, self._noted = PositionFile(folder), {}, 0
+        if not self.settings.remote:
+            self._bus.publish(RUN, self._run)
 
     def _note_segment(self) -> None:
         """Note the session with each segment: somebody may have removed the note."""
@@ -122,6 +140,7 @@ class Recorder:
             "dropped_samples": float(self.store.dropped_samples),
             "dropped_messages": float(self.store.dropped_messages + self.feed.dropped),
             "rejected": float(self.feed.rejected),
+            "refused_messages": float(self.feed.refused),
             "segments": float(self.store.segment_count),
             "free_share": -1.0 if math.isnan(share) else share,
             "disk_trouble": float(bool(self.store.failure) or self._disk.short),

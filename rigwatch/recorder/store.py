@@ -47,7 +47,7 @@ class Store:
         samples: samples on the disk.
         dropped_samples: samples dropped because the disk was unavailable for too long.
         dropped_messages: other messages dropped.
-        segment_count: number of segments started.
+        segment_count: number of segments of the session that were started.
         failure: why the disk cannot be written, empty otherwise.
     """
 
@@ -157,6 +157,15 @@ class Store:
         writer, self._writer = self._writer, None
         if writer is not None:
             writer.close()
+
+    def move_to(self, folder: Path, run: RunInfo) -> None:
+        """Write what is added from now on to the folder of another session.
+
+        Raises:
+            SessionError: the segment cannot be closed; what it holds is on the disk.
+        """
+        self.folder, self._run, self.segment_count = folder, run, 0
+        self._finish()
 
     def close(self, now: float, t_ns: int) -> list[Event]:
         """Write waiting messages and close the segment; unwritten ones count as dropped."""

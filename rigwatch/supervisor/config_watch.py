@@ -1,21 +1,21 @@
 """Follows the configuration while the rig runs: a change restarts the processes it concerns.
 
-    file changed ─▶ read ─┬─ wrong: reported with its line, nothing is restarted
-                          └─ valid: reported, and processes of the changed sections are restarted
+    file changed ─▶ settled ─▶ read ─┬─ wrong: reported with its line, nothing is restarted
+                                     └─ valid: reported, processes of changed sections restarted
 
 A recorder is restarted by every change, as a session carries the hash of its configuration. A daq
 or recorder of several rigs restarts the changed rig by itself, so that the others continue.
 """
 
-import hashlib
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 from rigwatch.supervisor.plan import PROCESSES, ProcessPlan
+from rigwatch.supervisor.settled_file import SettledFile
 from rigwatch.supervisor.supervisor import Supervisor
 from rigwatch.wire.errors import ConfigError
-from rigwatch.wire.rig_config import RigConfig, load_rig, rig_text
+from rigwatch.wire.rig_config import RigConfig, load_rig
 
 INTERVAL = 0.5
 """Time between two checks of the file [s]."""
@@ -50,17 +50,15 @@ class ConfigWatch:
     ) -> None:
         self._path, self._config, self._supervisor = Path(path), config, supervisor
         self._tell, self._load, self._follow, self._clock = tell, read, follow, clock
-        self._hash, self._checked_at = hash_of(self._path), clock()
+        self._file, self._checked_at = SettledFile(self._path), clock()
 
     def check(self) -> None:
         """Check the file if it is due, and act on a change."""
         if self._clock() - self._checked_at < INTERVAL:
             return
         self._checked_at = self._clock()
-        found = hash_of(self._path)
-        if found in (self._hash, ""):
+        if not self._file.has_new_content():
             return
-        self._hash = found
         try:
             self._take(self._load(self._path))
         except ConfigError as error:
@@ -88,22 +86,6 @@ class ConfigWatch:
 
     def _plans(self) -> dict[str, ProcessPlan]:
         return {name: one.child.plan for name, one in self._supervisor.processes.items()}
-
-
-def hash_of(path: Path) -> str:
-    """Hash of a configuration's content; "" while it cannot be read, as during a save."""
-    try:
-        return hashlib.sha256(_content(path)).hexdigest()
-    except OSError:
-        return ""
-
-
-def _content(path: Path) -> bytes:
-    """That of the file and its bases; of the file alone while they do not fit together."""
-    try:
-        return rig_text(path).encode()
-    except ConfigError:
-        return path.read_bytes()
 
 
 def affected(before: RigConfig, after: RigConfig) -> set[str]:

@@ -9,8 +9,9 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
-from rigwatch.supervisor.config_watch import INTERVAL, ConfigWatch, hash_of
+from rigwatch.supervisor.config_watch import INTERVAL, ConfigWatch
 from rigwatch.supervisor.plan import ProcessPlan, plan
+from rigwatch.supervisor.settled_file import SettledFile
 from rigwatch.supervisor.several import plan_several
 from rigwatch.supervisor.supervisor import Supervisor
 from rigwatch.wire.errors import ConfigError
@@ -44,7 +45,7 @@ class RigSet:
         self._supervisor, self._tell = supervisor, tell
         self._rigs = dict(rigs)
         self._watches = {path: self._watch(path, config) for path, config in rigs}
-        self._wrong = {path: hash_of(path) for path in paths if path not in self._rigs}
+        self._wrong = {path: SettledFile(path) for path in paths if path not in self._rigs}
         self._there = dict.fromkeys(paths, time.monotonic())
         self._checked_at = time.monotonic()
 
@@ -64,10 +65,8 @@ class RigSet:
                 self._leave(path)
 
     def _join(self, path: Path) -> None:
-        found = hash_of(path)
-        if found in (self._wrong[path], ""):
+        if not self._wrong[path].has_new_content():
             return
-        self._wrong[path] = found
         try:
             config = self._read(path)
             plan_several([*self._rigs.items(), (path, config)], self._without)
@@ -81,7 +80,7 @@ class RigSet:
 
     def _leave(self, path: Path) -> None:
         del self._watches[path]
-        self._wrong[path] = ""
+        self._wrong[path] = SettledFile(path, known=False)
         self._tell(f"{path} is gone: rig {self._rigs.pop(path).rig.id} leaves")
         self._supervisor.follow(self._plans())
 

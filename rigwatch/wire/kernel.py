@@ -8,6 +8,10 @@ other files that are compiled into the function are part of the cache key too.
 numba compiles a function anew for each constant that another one passes to it, and for every one a
 way in from Python, which for a state of many arrays takes as long as the function. A part has
 neither, and a kernel has one copy for all constants.
+
+numba counts the references to each array that a function takes from a tuple or passes on, which for
+a state of many arrays takes most of its time. Kernels and parts borrow the arrays of their caller
+and count none, unless they say that they allocate: only these may make arrays or return them.
 """
 
 import hashlib
@@ -20,28 +24,37 @@ from numba import njit
 from numba.core import types
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
+from numba.core.targetconfig import ConfigStack
 
+_RULES = "arrays borrowed"
+"""How functions are compiled; to be changed with it, since it is part of the cache's key."""
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def kernel(**options: Any) -> Callable[[F], F]:
-    """Decorator: compile with numba's `njit` and these options, and cache the result."""
+def kernel(*, allocates: bool = False, **options: Any) -> Callable[[F], F]:
+    """Decorator: compile with numba's `njit` and these options, and cache the result.
+
+    Args:
+        allocates: whether it makes arrays, returns one, or calls a part that returns one; without
+            this, such a function is refused when it is compiled.
+        options: of numba's `njit`.
+    """
 
     def compiled(function: F) -> F:
-        dispatcher = _compiled(function, options)
+        dispatcher = _compiled(function, {"_nrt": allocates, **options})
         dispatcher._cache = _KeyedByCode(function)  # type: ignore[no-untyped-call]
         return dispatcher  # type: ignore[no-any-return]
 
     return compiled
 
 
-def part(**options: Any) -> Callable[[F], F]:
-    """Decorator: compile with numba's `njit` and these options, for calls by kernels alone."""
+def part(*, allocates: bool = False, **options: Any) -> Callable[[F], F]:
+    """Decorator: as `kernel`, for calls by kernels alone."""
     # What is inlined is compiled on its own only if Python calls it.
     options.setdefault("no_cpython_wrapper", options.get("inline") != "always")
 
     def compiled(function: F) -> F:
-        return _compiled(function, options)  # type: ignore[no-any-return]
+        return _compiled(function, {"_nrt": allocates, **options})  # type: ignore[no-any-return]
 
     return compiled
 
@@ -50,14 +63,38 @@ def _compiled(function: F, options: Mapping[str, Any]) -> Any:
     """The function for kernels, which takes a constant for any value of its type."""
     plain: Any = types.unliteral
     dispatcher: Any = njit(**{"no_cfunc_wrapper": True, **options})(function)
-    original = dispatcher.get_call_template
+    original, add = dispatcher.get_call_template, dispatcher.add_overload
 
     def without_constants(arguments: Any, keywords: Any) -> Any:
         named = {name: plain(kind) for name, kind in keywords.items()}
-        return original(tuple(map(plain, arguments)), named)
+        found = original(tuple(map(plain, arguments)), named)
+        _check_owner(function, dispatcher)
+        return found
 
-    dispatcher.get_call_template = without_constants
+    def checked(compiled: Any) -> None:
+        if not options["_nrt"] and _holds_array(compiled.signature.return_type):
+            raise TypeError(f"{function.__qualname__} returns an array: it has to say `allocates`")
+        add(compiled)
+
+    dispatcher.get_call_template, dispatcher.add_overload = without_constants, checked
     return dispatcher
+
+
+def _check_owner(called: Callable[..., Any], dispatcher: Any) -> None:
+    """An array that a part returns needs a caller that counts references, or it is never freed."""
+    caller = ConfigStack.top_or_none()  # type: ignore[no-untyped-call]
+    returned = (one.signature.return_type for one in dispatcher.overloads.values())
+    if caller is not None and not caller.nrt and any(map(_holds_array, returned)):
+        raise TypeError(
+            f"what calls {called.__qualname__}, which returns an array, `allocates` too"
+        )
+
+
+def _holds_array(kind: types.Type) -> bool:
+    """Whether a value of this type is an array, or a tuple with one."""
+    if isinstance(kind, types.BaseTuple):
+        return any(map(_holds_array, kind))  # type: ignore[call-overload]
+    return isinstance(kind, types.Array)
 
 
 class _KeyedByCode(FunctionCache):
@@ -78,7 +115,7 @@ class _KeyedByCode(FunctionCache):
 
 def fingerprint(function: Callable[..., object]) -> str:
     """SHA-256 of a function's code, its global constants, and the compiled functions it calls."""
-    text = "\n".join(_parts(function, set()))
+    text = "\n".join((_RULES, *_parts(function, set())))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -91,6 +128,7 @@ def _parts(function: Any, seen: set[object]) -> Iterator[str]:
         yield f"{code.co_name} {code.co_code.hex()} {code.co_names} {constants!r}"
         for name, value in _globals(code, function.__globals__):
             if isinstance(value, Dispatcher):
+                yield f"{name} {sorted(value.targetoptions.items())}"
                 yield from _parts(value.py_func, seen)
             elif (written := getattr(value, "_defn", None)) is not None:  # an intrinsic
                 yield from _parts(written, seen)

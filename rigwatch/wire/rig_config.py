@@ -229,6 +229,14 @@ class RecorderSection(Section, frozen=True):
 
     folder: Annotated[Text, Meta(description="folder of the sessions")] = "sessions"
     segment: Annotated[float, Meta(gt=0, description="length of a segment [s]")] = 3600.0
+    session_days: Annotated[
+        float,
+        Meta(
+            ge=0,
+            description="length of a session, after which the next one begins without a missing "
+            "sample [days]; 0 for one session until the recorder stops",
+        ),
+    ] = 0.0
     flush: Annotated[float, Meta(gt=0, le=0.5, description="time between flushes [s]")] = 0.5
     remote: Annotated[
         bool,

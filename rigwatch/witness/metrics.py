@@ -1,5 +1,7 @@
 """A Prometheus endpoint: what the witness knows of the rig, as figures to collect."""
 
+import logging
+import sys
 import threading
 from collections import Counter
 from collections.abc import Iterator
@@ -14,6 +16,7 @@ from rigwatch.wire.rig_config import SecuritySection
 if TYPE_CHECKING:
     from prometheus_client.core import Metric
 
+_log = logging.getLogger(__name__)
 _LOOPBACK = ("127.0.0.1", "::1", "localhost")
 ALIVE_S = 5.0
 """Age of a health message up to which its process counts as alive [s]."""
@@ -123,11 +126,18 @@ class Endpoint:
         except OSError as error:
             text = f"cannot listen at {address}: {reason_of(error)}"
             raise RigwatchError(f"witness.metrics: {text}") from None
+        self._server.handle_error = _not_answered  # type: ignore[assignment,method-assign]
 
     def close(self) -> None:
         """Stop serving."""
         self._server.shutdown()
         self._server.server_close()
+
+
+def _not_answered(_request: object, client: object) -> None:
+    """Log in one line that a request ended with an error; that clients go away is none."""
+    if not isinstance(error := sys.exc_info()[1], ConnectionError):
+        _log.warning("witness.metrics: a request of %s ended: %s", client, error)
 
 
 def _host_and_port(address: str) -> tuple[str, int]:

@@ -77,7 +77,8 @@ class Witness:
         self._alarms = bus.listen(ALARMS)
         self._stale_after = settings.stale_after or LEAST_SILENCE
         self._silence = Silence(now + max(0.0, FOR_MONITOR - self._stale_after))
-        self._stale = StaleAlarm(CommandCheck(bus, security), kept)
+        self._check = CommandCheck(bus, security)
+        self._stale = StaleAlarm(self._check, kept)
         # An alarm of an earlier run ends with an estimate, not with the patience for the first.
         self._unheard = self._stale.holds
         self._commands = bus.subscribe(COMMANDS)
@@ -123,9 +124,12 @@ class Witness:
     def _report(self, now: float, t_ns: int) -> None:
         silent = self._silence.age(now)
         stale = self._stale.holds
+        lost = self._commands.dropped + self._commands.rejected + self._commands.refused
         counters = {
             "estimates_silent_s": silent,
             "lost_alarms": float(self._alarms.lost),
+            "commands_refused": float(self._check.refused),
+            "commands_lost": float(lost),
             **self._announcer.counters,
             **self._outputs.counters,
         }

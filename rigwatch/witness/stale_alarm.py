@@ -67,16 +67,14 @@ class StaleAlarm:
         """Execute an operator's command for this alarm, or say why not."""
         if command.name not in (MONITOR_STALE, EVERY_ALARM):
             return
-        if why_not := self._obstacle(command):
-            # Commands for all alarms are answered by the monitor.
-            if command.name == MONITOR_STALE:
-                user = command.user[:LONGEST_NAME]
-                text = f"{command.action} of {MONITOR_STALE} by {user} refused: {why_not}"
-                yield Event("witness", t_ns, "warning", "alarm_command_refused", text)
+        why_not = self._obstacle(command)
+        # A command for all alarms that does not concern this one is verified by the monitor.
+        if why_not and command.name == EVERY_ALARM:
             return
         verdict = self._check.judge(command)
-        if verdict.refusal:
-            text = f"{command.action} of {command.name} refused: {verdict.refusal}"
+        if why_not := verdict.refusal or why_not:
+            user = command.user[:LONGEST_NAME]
+            text = f"{command.action} of {command.name} by {user} refused: {why_not}"
             yield Event("witness", t_ns, "warning", "alarm_command_refused", text)
             return
         user = command.user[:LONGEST_NAME]

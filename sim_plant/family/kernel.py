@@ -288,7 +288,7 @@ def runge_kutta(  # noqa: PLR0917
         y[i] += h / 6.0 * (total[i] + k[i])
 
 
-@kernel(error_model="numpy")
+@kernel(allocates=True, error_model="numpy")
 def simulate(  # noqa: PLR0917
     volts: Floats,
     feedback: float,

@@ -1,4 +1,8 @@
-"""An attack on a secured rig of real processes, and what is looked at meanwhile."""
+"""An attack on a rig of real processes, with or without keys, and what is looked at meanwhile.
+
+With keys the router forwards nothing that a role may not say. Without keys it forwards everything
+but oversized messages, and the processes themselves have to drop what is not their owners'.
+"""
 
 import contextlib
 import json
@@ -13,18 +17,35 @@ from pathlib import Path
 
 import numpy as np
 
+from rigwatch.wire.bus import KEY as MODEL_KEY
 from rigwatch.wire.bus import MAX_PAYLOAD, Bus
 from rigwatch.wire.delivery import SampleReader
-from rigwatch.wire.messages import ALARMS, EVENTS, GAPS, HEALTH, MODELS, RUN, SampleBlock
+from rigwatch.wire.errors import MessageError
+from rigwatch.wire.messages import (
+    ALARMS,
+    COMMANDS,
+    EVENTS,
+    GAPS,
+    HEALTH,
+    MODELS,
+    RUN,
+    SAMPLES,
+    SampleBlock,
+    decode,
+)
 from tests.access.rogue import ALLOWED_SAID, BOOT
 from tests.access.secured_rig import SecuredRig, make_keys
 from tests.bus.publisher import wave
+from tests.bus.rig import TestRig
 from tests.monitor_process.model import monitor_section
 from tests.waiting import eventually
 
 STRANGERS = ("dashboard", "recorder", "device", "ack-eve")
 """Roles of the hostile clients, the last an operator."""
 MARK = b"\x01" * 16
+OF_RECORDERS = ("run", "health/recorder")
+DROPPED = ("rejected", "foreign_samples", "duplicate_samples")
+"""Counters of the monitor for what it does not take for samples of its rig."""
 PACE_S = 0.0005
 """Pause between two messages, below the rate at which Zenoh drops some [s]."""
 
@@ -34,8 +55,10 @@ class Outcome:
     """Counts of an attack.
 
     Attributes:
-        sent: messages and queries by what the access list does with them.
-        denied, refused: as counted by the router and by the monitor.
+        sent: messages and queries by what becomes of them: "denied" by the router, "allowed",
+            "asked", a "command" or "samples" (each of them) that a process has to refuse.
+        denied, refused: as counted by the router, and by monitor and witness.
+        dropped: payloads and samples that the monitor has not taken for samples of its rig.
         samples, wrong: samples delivered to a reader, and those that differ from the real ones.
         ended: processes that ended.
         changes: model changes, changed model files and alarms by an operator.
@@ -45,6 +68,7 @@ class Outcome:
     sent: Counter[str] = field(default_factory=Counter)
     denied: float = 0.0
     refused: float = 0.0
+    dropped: float = 0.0
     samples: int = 0
     wrong: int = 0
     lost: int = 0
@@ -55,13 +79,21 @@ class Outcome:
 
 
 class Attacked:
-    """A secured rig with router, source, monitor and witness, and hostile clients."""
+    """A rig with router, source, monitor and witness, and hostile clients.
 
-    def __init__(self, folder: Path) -> None:
-        keys = make_keys(folder / "keys")
+    Args:
+        folder: of all files.
+        keys: whether the rig has keys; the clients then have certificates of other roles.
+    """
+
+    def __init__(self, folder: Path, *, keys: bool = True) -> None:
         section = monitor_section(folder) + "\n[witness]\n"
         section += f'\n[recorder]\nfolder = "{folder}/sessions"\n'
-        self.rig = SecuredRig(folder, keys, section)
+        self.keys = keys
+        if keys:
+            self.rig: TestRig = SecuredRig(folder, make_keys(folder / "keys"), section)
+        else:
+            self.rig = TestRig(folder, f'{section}[bus.security]\nsecret = "{folder}/own/secret"\n')
         self.model = folder / "model.toml"
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
         self.outcome = Outcome()
@@ -84,12 +116,18 @@ class Attacked:
         self.processes["daq"] = rig.publisher(BOOT, "--wave")
         self._reader = SampleReader(self.observer)
         self.clients = [rig.bus(name) for name in STRANGERS]
+        if not self.keys:
+            for client in self.clients:
+                client.signer = None  # only the rig's own account can read its secret
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._watch, daemon=True)
         self._thread.start()
         eventually(lambda: self.outcome.samples > 0, "samples")
-        eventually(lambda: "router denied_messages" in self.newest, "the router's figures")
-        eventually(lambda: "monitor commands_refused" in self.newest, "the monitor's figures")
+        if self.keys:
+            eventually(lambda: "router denied_messages" in self.newest, "the router's figures")
+        for process in ("monitor", "witness"):
+            name = f"{process} commands_refused"
+            eventually(lambda n=name: n in self.newest, f"the figures of the {process}")  # type: ignore[misc]
 
     def _watch(self) -> None:
         """Compare every sample delivered with the real one, and note figures and changes."""
@@ -123,7 +161,8 @@ class Attacked:
                 return
             client = self.clients[number % len(self.clients)]
             _send(client, how, key, payload)
-            self.outcome.sent[_fate(client, how, key, len(payload))] += 1
+            fate = self._fate(client, how, key, payload)
+            self.outcome.sent[fate] += len_of_samples(payload) if fate == "samples" else 1
             time.sleep(PACE_S)
 
     def knock(self, times: int) -> None:
@@ -153,9 +192,34 @@ class Attacked:
         outcome.changes += [n for n in map(_operator, journal) if n]
         outcome.denied = self.newest["router denied_messages"]
         outcome.refused_connections = self.newest["router refused_connections"]
-        outcome.refused = self.newest["monitor commands_refused"]
-        outcome.refused += self.newest["monitor commands_lost"]
+        outcome.refused = self._counted("commands_refused", "commands_lost")
+        outcome.dropped = self._counted(*DROPPED)
         return outcome
+
+    def _counted(self, *names: str) -> float:
+        """Sum of counters of the monitor and, for commands about its alarm, of the witness."""
+        return sum(self.newest[f"{who} {name}"] for who in ("monitor", "witness") for name in names)
+
+    def _fate(self, client: Bus, how: str, key: str, payload: bytes) -> str:
+        """What becomes of a message, by the access list or without one."""
+        size = len(payload) + (len(MARK) if how == "put" else 0)
+        if size > MAX_PAYLOAD:
+            return "denied"
+        if self.keys and not _allowed_by_role(client, how, key):
+            return "denied"
+        if key in (COMMANDS.key, MODEL_KEY):
+            return "command"
+        if how == "ask":
+            return "asked"
+        return "samples" if key == SAMPLES.key else "allowed"
+
+
+def len_of_samples(payload: bytes) -> int:
+    """How much is counted for a message in place of samples: each sample, or the payload."""
+    try:
+        return len(decode(SampleBlock, payload))
+    except MessageError:
+        return 1
 
 
 def _operator(line: str) -> str:
@@ -169,23 +233,20 @@ def _send(client: Bus, how: str, key: str, payload: bytes) -> None:
         client.query(key, payload, timeout=0.05)
 
 
-def _fate(client: Bus, how: str, key: str, size: int) -> str:
-    """What the access list does with a message: "denied", "allowed", or a command to verify."""
+def _allowed_by_role(client: Bus, how: str, key: str) -> bool:
+    """Whether the access list lets a message pass."""
     operator = client.process.startswith("ack")
-    if size + (len(MARK) if how == "put" else 0) > MAX_PAYLOAD:
-        return "denied"
     if how == "ask":
-        asks_model = key in ("monitor/model", "monitor/receiver")
-        return "denied" if asks_model and not operator else "asked"
-    if key in ALLOWED_SAID or (key == "run" and client.process == "recorder"):
-        return "allowed"
-    return "command" if operator and key == "monitor/commands" else "denied"
+        return operator or key not in (MODEL_KEY, "monitor/receiver")
+    if key in OF_RECORDERS:
+        return client.process == "recorder"
+    return key in ALLOWED_SAID or (operator and key == COMMANDS.key)
 
 
 @contextlib.contextmanager
-def attacked(folder: Path) -> Iterator[Attacked]:
+def attacked(folder: Path, *, keys: bool = True) -> Iterator[Attacked]:
     """A rig under attack, ended afterwards."""
-    made = Attacked(folder)
+    made = Attacked(folder, keys=keys)
     with made.rig:
         made.start()
         yield made

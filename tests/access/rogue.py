@@ -32,7 +32,7 @@ from tests.bus.publisher import wave
 KINDS = 200
 BOOT = 5
 """The boot of the rig's real samples, which a client reads on the bus."""
-SAID = tuple(topic.key for topic in TOPICS)
+SAID = tuple(key for topic in TOPICS for key in topic.keys)
 NAMED = (
     "source/0", "source/5", "source/x", "said/monitor/0", "said/monitor/5", "said/witness/1",
     "said/nobody/0",

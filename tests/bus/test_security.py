@@ -184,6 +184,8 @@ def test_the_command_makes_issues_revokes_and_shows(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "keys"
+    assert main(["keys", "show", str(folder)]) == 2
+    assert f"make one with `rigwatch keys new {folder}`" in capsys.readouterr().err
     assert main(["keys", "new", str(folder), "--rig", "bench", "--address", "192.0.2.5"]) == 0
     assert {path.stem for path in folder.glob("*.pem")} == {"authority", *ROLES}
     assert all(stat.S_IMODE(p.stat().st_mode) == 0o600 for p in folder.glob("*.key"))

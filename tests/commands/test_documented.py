@@ -59,11 +59,17 @@ def test_json_may_stand_before_a_sub_command_or_after_it(
 def test_a_sub_command_that_is_missing_or_unknown_is_refused(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    for words in (["study"], ["study", "nwe", "emps"]):
-        with pytest.raises(SystemExit) as exit_:
-            main(words)
-        assert exit_.value.code == 2
-    assert "'nwe'" in capsys.readouterr().err
+    with pytest.raises(SystemExit) as exit_:
+        main(["study"])
+    assert exit_.value.code == 2
+    assert "ACTION" in capsys.readouterr().err
+    for words, told in (
+        (["study", "nwe", "emps"], "found command 'nwe'; did you mean 'new'?"),
+        (["dmo"], "found command 'dmo'; did you mean 'demo' or 'undo' or 'model'?"),
+        (["--json", "xyz"], "found command 'xyz', expected one of ack, add, "),
+    ):
+        assert main(words) == 2
+        assert capsys.readouterr().err.startswith(f"rigwatch: {told}")
 
 
 @pytest.mark.parametrize("name", COMMANDS)

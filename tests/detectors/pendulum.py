@@ -28,7 +28,7 @@ H = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, 1.0, 0, 0]])
 POSITION_BIAS = np.array([[1.0], [0.0], [0.0]])
 
 
-@kernel()
+@kernel(allocates=True)
 def derivative(x, force):
     """d/dt of (xc, xc', φ, φ')."""
     sine, cosine = np.sin(x[2]), np.cos(x[2])
@@ -41,7 +41,7 @@ def derivative(x, force):
     return np.array([x[1], cart, x[3], angle])
 
 
-@kernel()
+@kernel(allocates=True)
 def advanced(x, force):
     """The state one sample later, by Runge and Kutta's fourth-order step."""
     k1 = derivative(x, force)
@@ -51,7 +51,7 @@ def advanced(x, force):
     return x + STEP / 6.0 * (k1 + 2 * k2 + 2 * k3 + k4)
 
 
-@kernel()
+@kernel(allocates=True)
 def jacobian(x, force):
     """Φ: derivative of `advanced` after the state, by central differences."""
     phi = np.empty((4, 4))
@@ -83,7 +83,7 @@ def simulated(seconds: float, bias: float, at: float, seed: int):
     return balanced(feedback(), push, noise)
 
 
-@kernel()
+@kernel(allocates=True)
 def balanced(gain, push, noise):
     """Force, measurements and states under state feedback that follows a slow sine."""
     n = len(push)
@@ -98,7 +98,7 @@ def balanced(gain, push, noise):
     return force, y, states
 
 
-@kernel()
+@kernel(allocates=True)
 def both_filters(force, y, augmented, noise, window):
     """Both filters: innovations, their windowed sum, the angle's innovation, bias, states."""
     (e, c, h), (w, v, v_inverse) = augmented, noise

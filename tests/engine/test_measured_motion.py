@@ -11,6 +11,7 @@ from rigwatch.physics.engine.equations.measured_motion import (
     along_measured_motion,
     has_hidden_states,
     predicted_outputs,
+    unmoved_at_rest,
 )
 from rigwatch.physics.engine.equations.model import (
     Input,
@@ -153,6 +154,26 @@ def test_input_that_is_kept_stays_kept() -> None:
     assert model.held("voltage") == "zero"
     assert model.held("x") == model.held("v") == "linear"
     assert list(model.states) == ["P1", "P2", "s", "r", "mean"]
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.01])
+def test_what_follows_the_acceleration_is_not_moved_by_a_push_at_rest(speed: float) -> None:
+    plain = shipped_models()["servo-pneumatic"]
+    fixed = {name: replace(p, fixed=True) for name, p in plain.parameters.items()}
+    model = replace(plain, parameters=fixed)
+    means = []
+    for each in (model, unmoved_at_rest(model)):
+        compiled = compile_system(compose(along_measured_motion(each)))
+        rows, states = np.tile([0.5, 0.0, speed], (256, 1)), compiled.system.states
+        start = np.array([[state.start for state in states.values()]])
+        run = compiled.simulate(
+            rows, 1 / 256, np.zeros(1, np.int64), len(rows),
+            initial=start, parameters=compiled.vector({}),
+        )  # fmt: skip
+        means.append(run.last[0][list(states).index("mean")])
+
+    assert abs(means[0]) > 1.0
+    assert means[1] == pytest.approx(0.0 if speed == 0.0 else means[0], abs=1e-9)
 
 
 def test_positions_alone_are_predicted_as_a_balance() -> None:

@@ -121,7 +121,7 @@ def test_g_has_to_say_whether_it_is_gravity_or_the_gram() -> None:
         (GOOD, {"channels": {"position": "qm"}}, "found 'qm', expected column[unit]"),
         (GOOD, {"channels": {"gap": "qm*2"}}, "or u*35.15[N], and [1] for what has no unit"),
         (GOOD, {"channels": {"force": "u*gtau[N]"}}, "force: found no scalar 'gtau'"),
-        (GOOD, {"channels": {}}, "no channel is mapped, its columns are t, qm, u"),
+        (GOOD, {"channels": {}}, "its columns are t, qm, u; expected --map 'CHANNEL=COLUMN"),
         (GOOD, {"time": "time[s]"}, "time: found no column 'time'"),
         (GOOD, {"time": "t[m]"}, "time: found the unit 'm', expected one of s, ms"),
         (GOOD, {"time": ""}, "found neither time nor rate"),

@@ -266,20 +266,33 @@ class Field:
 
     def renew_monitor(self, device: Device) -> None:
         """A new monitor without a past: no chattering alarm, no flood."""
-        self.kill("monitor")
-        self.journal.unlink()
-        self.start("monitor")
+        self.forget_alarms()
         self.settle(device)
 
+    def forget_alarms(self, path: Path | None = None) -> None:
+        """Kill the monitor and its journal, and start another; it goes on where that one was.
+
+        Args:
+            path: its configuration, the rig's if None.
+        """
+        self.kill("monitor")
+        self.journal.unlink()
+        self.start("monitor", path=path)
+
     def calm(self, device: Device, *names: str) -> None:
-        """A new monitor if one of the alarms stands, or was raised so often that it chatters."""
+        """A new monitor if one of the alarms stands or may begin to chatter."""
+        if self.restless(*names):
+            self.renew_monitor(device)
+
+    def restless(self, *names: str) -> bool:
+        """Whether one of the alarms stands, or was raised so often that it may begin to chatter."""
         recent = time.time_ns() - 60 * 10**9
         for name in names:
             records = self.journalled(name)
             raised = [one for one in records if one.active and one.alarm.t_ns > recent]
             if len(raised) >= 3 or any(one.active for one in records[-1:]):
-                self.renew_monitor(device)
-                return
+                return True
+        return False
 
     def _listen(self, stop: threading.Event) -> None:
         subscriptions = {

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from monitor.process.startup_grace import SETTLING
 from rigwatch.wire.bus import MAX_PAYLOAD, Bus
 from rigwatch.wire.delivery import SampleRing
 from rigwatch.wire.errors import BusError
@@ -30,10 +31,10 @@ class BusRig(Field):
         self.start()
         self.proxy, port = self.rig.proxy()
         text = self.rig.path.read_text()
-        far = self.folder / "far.toml"
-        far.write_text(text.replace(f'router = "tcp/127.0.0.1:{self.rig.listen}"',
-                                    f'router = "tcp/127.0.0.1:{port}"'))  # fmt: skip
-        self.start("monitor", path=far)
+        self.far = self.folder / "far.toml"
+        self.far.write_text(text.replace(f'router = "tcp/127.0.0.1:{self.rig.listen}"',
+                                         f'router = "tcp/127.0.0.1:{port}"'))  # fmt: skip
+        self.start("monitor", path=self.far)
         self.rig.publisher(BOOT, "--wave", "--twice", f"{TWICE}")
         self.stranger: Bus = self.rig.bus("stranger")
         self.goes_on(1500)
@@ -53,6 +54,14 @@ class BusRig(Field):
         assert not missing, (missing, self.gaps)
         assert judged == list(range(first, judged[-1] + 1))
         assert {b.boot for b in self.estimates()} == {BOOT}
+
+    def renew(self) -> None:
+        """A monitor behind the proxy, without a past: on a busy machine `stale` chatters."""
+        self.forget_alarms(self.far)
+        settled_ns = time.time_ns() + round(1.1e9 * SETTLING)
+        eventually(
+            lambda: any(b.t_ns[-1] > settled_ns for b in self.estimates()[-1:]), "it has settled"
+        )
 
     def counted(self, name: str) -> float:
         """A counter of the monitor, from a health message that is sent after now."""
@@ -147,18 +156,24 @@ def test_26_a_router_that_restarts(rig: BusRig) -> None:
 
 @pytest.mark.parametrize("seconds", [0.5, 2.5], ids=["short", "longer than the lease"])
 def test_27_a_partition(rig: BusRig, seconds: float) -> None:
-    first = rig.newest()
+    """All that a row says is asserted at each attempt.
+
+    The alarm is not waited for to clear: where a busy machine delays samples again and again it
+    chatters, and stands until a minute has passed without one.
+    """
 
     def partition() -> float:
-        began = time.time_ns()
+        first, began = rig.newest(), time.time_ns()
         with stopped(rig.proxy):
             took = rig.noticed("stale", began)
             time.sleep(seconds)
+        rig.goes_on(300)
+        rig.each_is_judged_once(first)
         return took
 
-    least_of(partition, 0.1, lambda: rig.cleared("stale"))
-    rig.goes_on(300)
-    rig.each_is_judged_once(first)
+    if rig.restless("stale"):
+        rig.renew()
+    least_of(partition, 0.1, rig.renew)
     assert [g for g in rig.gaps if g.reporter == "monitor"] == []
 
 

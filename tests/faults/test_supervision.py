@@ -13,6 +13,7 @@ import pytest
 
 from rigwatch.demo.rig_file import write_rig_file
 from rigwatch.supervisor.child import LONGEST_LINE
+from rigwatch.supervisor.settled_file import SettledFile
 from rigwatch.wire.typed_files.shipped import find_config
 from tests.tooling.test_supervisor import WORKER, of_kind, supervise, worker
 from tests.tooling.test_up import WITHOUT, Rig, on_a_port_of_its_own
@@ -70,6 +71,21 @@ def test_the_rig_goes_on_whatever_becomes_of_the_output(output: str, config: Pat
         finally:
             up.terminate()
         assert up.wait(timeout=40) == 0
+
+
+def test_a_file_that_is_being_saved_is_read_once_it_is_whole(tmp_path: Path) -> None:
+    path = tmp_path / "rig.toml"
+    path.write_text("[rig]\n[recorder]\n")
+    file = SettledFile(path)
+    for part in ("", "[rig]\n", "[rig]\n[recorder]\n[witness]\n"):
+        path.write_text(part)
+        assert not file.has_new_content(), "perhaps a part of it"
+    assert file.has_new_content()
+    assert not file.has_new_content(), "once"
+    path.write_text("")
+    assert not file.has_new_content()
+    path.write_text("[rig]\n[recorder]\n[witness]\n")
+    assert not any(file.has_new_content() for _ in range(3)), "as it was"
 
 
 @pytest.fixture

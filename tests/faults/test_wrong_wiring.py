@@ -25,6 +25,13 @@ class AmplifiedSource(WaveSource):
         return super()._one(number, index) * [1.0, 1.0, 4.0]
 
 
+class WeakSource(WaveSource):
+    """The drive's channel is read in a unit that is ten times too large."""
+
+    def _one(self, number: int, index: int):  # type: ignore[no-untyped-def]
+        return super()._one(number, index) * [0.1, 1.0, 1.0]
+
+
 def wired(folder: Path, source: WaveSource, keys: dict[str, str]) -> Iterator[tuple[Field, int]]:
     """A rig with its wiring from the first sample on, and the boot of its device."""
     section = f'adapter = "serial"\nport = "{folder}/line"'
@@ -94,3 +101,12 @@ def test_15_a_range_that_cannot_be(amplified: tuple[Field, int]) -> None:
         field.start("daq")
 
     least_of(told, 1.0, again)
+
+
+def test_15_a_drive_in_the_wrong_unit(tmp_path: Path) -> None:
+    for field, boot in wired(tmp_path, WeakSource(), {}):
+        alarm = field.raised("wiring_drive")
+        first = min(block.seq for block in field.estimates() if block.boot == boot)
+        assert alarm.value > alarm.high == 5.0
+        assert alarm.seq - first <= 2 * RATE, "two windows of motion"
+        nothing_is_judged(field, boot, alarm.seq)

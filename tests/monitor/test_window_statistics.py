@@ -2,9 +2,22 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from monitor.observer import window_statistics
-from monitor.observer.decision_state import AT, DRY, ERROR, HISTORY, SPEED, WET, new_state
+from monitor.observer.decision_state import (
+    AT,
+    BARE,
+    DRY,
+    ERROR,
+    HISTORY,
+    PASSED,
+    SPEED,
+    WET,
+    DecisionState,
+    new_state,
+)
+from monitor.observer.missing_force import high_pass
 from tests.compiled import from_python
 
 dry_force = from_python(window_statistics.dry_force)
@@ -13,22 +26,42 @@ friction = from_python(window_statistics.friction)
 FORCE, LENGTH = 0.6, 64
 
 
-@pytest.mark.parametrize("late", [0, 1, 2])
-def test_force_does_not_fall_with_samples_in_which_friction_turns(late: int) -> None:
-    at = np.arange(HISTORY)
-    speed = np.sin(2.0 * np.pi * (at + 0.3) / 32.0)
+def swinging() -> DecisionState:
+    """Rows of a motion that reverses every 16 samples."""
+    speed = np.sin(2.0 * np.pi * (np.arange(HISTORY) + 0.3) / 32.0)
     kept = new_state(1)
-    kept.rows[:, SPEED], kept.rows[:, WET] = speed, -speed
-    kept.rows[:, DRY] = -np.sign(speed)
-    kept.rows[:, ERROR] = FORCE * np.roll(kept.rows[:, DRY], late)
+    kept.rows[:, SPEED], kept.rows[:, WET], kept.rows[:, BARE] = speed, -speed, -np.sign(speed)
     kept.counts[AT.filled] = HISTORY
+    return kept
+
+
+@pytest.mark.parametrize("late", [-1, 0, 1, 2])
+def test_force_does_not_fall_with_samples_in_which_friction_turns(late: int) -> None:
+    kept = swinging()
+    kept.rows[:, DRY] = kept.rows[:, BARE]
+    kept.rows[:, ERROR] = FORCE * np.roll(kept.rows[:, DRY], late)
 
     force, viscous, _, share, _ = friction(kept, LENGTH, 1e-3)
 
     assert force == pytest.approx(FORCE, rel=1e-6)
-    assert dry_force(kept, LENGTH, LENGTH)[0] == pytest.approx(FORCE, rel=1e-6)
+    assert dry_force(kept, LENGTH, LENGTH, PASSED)[0] == pytest.approx(FORCE, rel=1e-6)
     assert viscous == pytest.approx(0.0, abs=1e-6)
     assert share == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("begun", [20, 32, 44])
+def test_friction_that_has_just_begun_is_not_told_half_as_large(begun: int) -> None:
+    kept = swinging()
+    corner = high_pass(2.0, 256.0)
+    bare = kept.rows[:, BARE]
+    always = np.concatenate([np.tile(bare[:32], 8), bare])
+    kept.rows[:, DRY] = lfilter(*corner, always)[-HISTORY:]
+    acts = np.arange(HISTORY) >= HISTORY - begun
+    kept.rows[:, ERROR] = FORCE * lfilter(*corner, np.where(acts, bare, 0.0))
+
+    _, acting = dry_force(kept, begun - 4, LENGTH, np.array(corner))
+
+    assert acting == pytest.approx(FORCE, rel=0.05)
 
 
 def test_a_motion_that_turns_at_every_sample_shows_no_friction() -> None:

@@ -85,6 +85,31 @@ def test_wrong_wiring_is_reported_and_nothing_is_judged(
     assert not any(block.column("armed").values.any() for block in estimates)
 
 
+@pytest.mark.parametrize("factor", [1000.0, 10.0, 0.1, -1.0])
+def test_a_drive_in_the_wrong_unit_or_reversed_is_reported_and_nothing_is_learnt(
+    factor: float,
+) -> None:
+    channels = run(SINE, 12.0, friction(8.0))
+    channels["voltage"] = factor * channels["voltage"]
+    times, estimates = watched(channels, monitor_rig.model())
+    assert times["wiring_drive"] <= 2.0
+    assert not {*JUDGED, "reference_learnt"} & times.keys()
+    assert not any(block.column("armed").values.any() for block in estimates)
+
+
+def test_a_rig_that_is_moved_by_hand_is_not_blamed_for_its_drive() -> None:
+    channels = run(SINE, 8.0)
+    channels["voltage"] = 1e-4 * channels["voltage"]
+    times, _ = watched(channels, monitor_rig.model())
+    assert not {name for name in times if name.startswith("wiring")}
+
+
+@pytest.mark.parametrize("level", [0.4, 1.5])
+def test_friction_from_the_start_is_no_wiring(level: float) -> None:
+    times, _ = watched(run(SINE, 6.0, friction(0.0, level)), monitor_rig.model())
+    assert not {name for name in times if name.startswith("wiring")}
+
+
 @pytest.mark.parametrize(
     "drive",
     [SINE, Sine(amplitude=1.0, frequency=1.5), Square(amplitude=1.4, frequency=8.0),
@@ -117,9 +142,16 @@ def test_a_wiring_alarm_clears_once_the_wiring_is_right_after_a_restart_of_the_d
     assert states == [(1, "unacknowledged"), (2, "cleared_unacknowledged")]
 
 
-def test_the_cut_into_blocks_changes_no_alarm_and_no_estimate() -> None:
+def ten_volts(c: Channels) -> None:
+    c["voltage"] = 10.0 * c["voltage"]
+
+
+@pytest.mark.parametrize("tamper", [in_g, ten_volts])
+def test_the_cut_into_blocks_changes_no_alarm_and_no_estimate(
+    tamper: Callable[[Channels], None],
+) -> None:
     channels = run(SINE, 6.0)
-    in_g(channels)
+    tamper(channels)
     channels["position"][300] = np.nan
     whole = watched(channels, monitor_rig.model())
     for length in (1, 37):

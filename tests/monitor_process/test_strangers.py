@@ -12,9 +12,10 @@ import pytest
 
 from monitor.alarms import Occasion
 from monitor.process.cursor import Cursor
+from rigwatch.wire.bus import KEY as MODEL_KEY
 from rigwatch.wire.bus import ModelReply, ModelRequest, ask_for_model
 from rigwatch.wire.bus.commands.command_check import signed
-from rigwatch.wire.messages import ALARMS, COMMANDS, ESTIMATES, AlarmCommand
+from rigwatch.wire.messages import ALARMS, COMMANDS, ESTIMATES, HEALTH, AlarmCommand, Health
 from tests.bus.publisher import wave
 from tests.bus.rig import PATIENCE
 from tests.monitor_process.test_process import Bench
@@ -52,6 +53,20 @@ def test_a_model_that_is_a_bomb_is_refused_and_watching_goes_on(bench: Bench, mo
     assert len(reply.text) < 400
     bench.send(wave(0, 64, 7, time.time_ns()))
     bench.turn_until(63)
+
+
+def test_a_question_that_is_no_request_for_a_model_is_refused_and_counted(bench: Bench) -> None:
+    answers = bench.observer.query(MODEL_KEY, b"[" * 50_000, timeout=PATIENCE)
+    assert [b"not a model request" in answer for answer in answers] == [True]
+    bench.got(HEALTH)
+    told: list[Health] = []
+
+    def counted() -> bool:
+        bench.turn()
+        told.extend(h for h in bench.got(HEALTH) if isinstance(h, Health))
+        return any(health.counters["commands_refused"] == 1.0 for health in told)
+
+    assert wait_until(counted, PATIENCE)
 
 
 def test_a_command_from_the_future_has_the_monitors_time_and_its_user_is_cut(bench: Bench) -> None:

@@ -1,7 +1,9 @@
 """`rigwatch commission` on recordings with faults of their own, and where its model goes."""
 
+import io
 import re
 from collections.abc import Callable
+from contextlib import redirect_stderr
 from dataclasses import replace
 from pathlib import Path
 
@@ -47,6 +49,18 @@ def changed(source: Path, target: Path, change: Change) -> Path:
 def commission(runs: dict[str, Path], output: Path, *more: str, **instead: Path) -> int:
     words = [word for role, path in (runs | instead).items() for word in (f"--{role}", str(path))]
     return main(["commission", *words, "--scheme", "transfer", "--output", str(output), *more])
+
+
+@pytest.fixture(scope="module")
+def commissioned(
+    runs: dict[str, Path], tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, str]:
+    """The model of the unchanged recordings, in the place of another, and what was said."""
+    output = tmp_path_factory.mktemp("commissioned") / "model.toml"
+    output.write_text("# the model before\n")
+    with redirect_stderr(io.StringIO()) as said:
+        assert commission(runs, output) == 0
+    return output, said.getvalue()
 
 
 def with_column(block: SampleBlock, name: str, values: np.ndarray, unit: str = "") -> SampleBlock:
@@ -99,17 +113,19 @@ def test_only_invalid_samples_are_left_out(
 
 
 def test_a_broken_sensor_that_the_model_does_not_need_is_noted(
-    runs: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    runs: dict[str, Path],
+    commissioned: tuple[Path, str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     def beside(block: SampleBlock) -> SampleBlock:
         broken = Column("temperature", "degC", np.full(len(block), np.nan))
         return replace(block, channels=(*block.channels, broken))
 
-    assert commission(runs, tmp_path / "model.toml") == 0
     healthy = changed(runs["healthy"], tmp_path / "healthy.mcap", beside)
     assert commission(runs, tmp_path / "other.toml", healthy=healthy) == 0
     assert "temperature: 15360 invalid samples" in capsys.readouterr().err
-    assert load_model(tmp_path / "other.toml") == load_model(tmp_path / "model.toml")
+    assert load_model(tmp_path / "other.toml") == load_model(commissioned[0])
 
 
 def reversed_sign(block: SampleBlock) -> SampleBlock:
@@ -156,16 +172,11 @@ def test_wrong_wiring_is_refused_unless_it_is_wanted(
     assert "s of recordings: this takes about" in capsys.readouterr().err  # the work begins
 
 
-def test_the_model_before_is_kept_with_its_history(
-    runs: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    output = tmp_path / "model.toml"
-    output.write_text("# the model before\n")
-    assert commission(runs, output) == 0
-    said = capsys.readouterr().err
+def test_the_model_before_is_kept_with_its_history(commissioned: tuple[Path, str]) -> None:
+    output, said = commissioned
     assert "about" in said
     assert "model.v1.toml" in said
-    assert (tmp_path / "model.v1.toml").read_text() == "# the model before\n"
+    assert output.with_name("model.v1.toml").read_text() == "# the model before\n"
     (line,) = model_versions.history(output)
     assert (line.step, line.sha256) == ("commission", model_versions.digest_of(output))
 

@@ -10,6 +10,7 @@ from monitor.model import EquationsPlant
 from monitor.observer import E, Observed, ObserverSignals, decide, friction_limit, new_state
 from monitor.observer import decision_state as d
 from monitor.observer.lagged_motion import FIRST, WHOLE
+from monitor.observer.missing_force import JUDGED
 from monitor.signals import GOOD, NEW_BOOT
 from tests.monitor.observed_rig import RATE, SINE, UNITS, model, run
 
@@ -51,7 +52,7 @@ def test_a_model_knows_what_its_rig_leaves_at_motions_that_were_not_recorded() -
 @pytest.mark.parametrize(("usual", "ratio"), [(np.inf, 4.0), (1.0, 1.0)], ids=["unseen", "known"])
 def test_limits_grow_only_where_the_motion_was_not_recorded(usual: float, ratio: float) -> None:
     n = 1024
-    judged, levels, zeros = np.zeros((n, 10)), np.zeros((n, 1)), np.zeros(n, np.bool_)
+    judged, levels, zeros = np.zeros((n, JUDGED)), np.zeros((n, 1)), np.zeros(n, np.bool_)
     judged[:, E] = 0.2 * np.random.default_rng(1).standard_normal(n)
     state = np.full(n, WHOLE)
     state[0] = FIRST

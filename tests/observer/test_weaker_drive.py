@@ -6,7 +6,7 @@ import pytest
 from monitor.observer import decide, new_state
 from monitor.observer import decision_state as d
 from monitor.observer.lagged_motion import FIRST, WHOLE
-from monitor.observer.missing_force import DRY_UNIT, VISCOUS_UNIT, WEAK, E
+from monitor.observer.missing_force import DRY_BARE, DRY_UNIT, JUDGED, VISCOUS_UNIT, WEAK, E
 
 SECONDS, RATE, ONSET, FORCE = 4.0, 256.0, 640, 3.0
 
@@ -14,10 +14,11 @@ SECONDS, RATE, ONSET, FORCE = 4.0, 256.0, 640, 3.0
 def verdict(residual: np.ndarray, driven: np.ndarray, speed: np.ndarray) -> float:
     """The verdict on a residual that begins at `ONSET`, with a drive that acts as `driven`."""
     n = speed.size
-    judged = np.zeros((n, 10))
+    judged = np.zeros((n, JUDGED))
     judged[:, E] = 0.05 * np.random.default_rng(1).standard_normal(n)
     judged[ONSET:, E] += residual[ONSET:]
     judged[:, DRY_UNIT], judged[:, VISCOUS_UNIT], judged[:, WEAK] = -np.sign(speed), -speed, driven
+    judged[:, DRY_BARE] = judged[:, DRY_UNIT]
     rules = d.DecisionRules(0.05, np.zeros(1), 9.0, 4.0, 9.0, 1.0, 0.0, 1.0, 0.01, 256, 192, 2.56)
     state = np.full(n, WHOLE)
     state[0] = FIRST

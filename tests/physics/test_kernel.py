@@ -1,13 +1,18 @@
-"""A compiled function is kept between runs, and compiled anew when anything in it has changed."""
+"""A compiled function is kept between runs, compiled anew when anything in it has changed, and
+borrows the arrays that it is given.
+"""
 
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+import pytest
 from numba import njit
+from numba.core.errors import NumbaError
 
-from rigwatch.wire.kernel import part
+from rigwatch.wire.kernel import kernel, part
 
 CALLER = """
 import called as parts
@@ -112,3 +117,62 @@ def test_a_part_is_compiled_once_for_all_constants() -> None:
 
     assert total(2.0, 4) == 2.0**2 + 2.0**3 + 2.0**4
     assert len(power.signatures) == 1
+
+
+def test_what_borrows_returns_no_array() -> None:
+    @kernel()
+    def same(rows: np.ndarray) -> np.ndarray:
+        return rows
+
+    @kernel()
+    def first_row(rows: np.ndarray) -> np.ndarray:
+        return rows[0]
+
+    with pytest.raises(TypeError, match="same returns an array: it has to say `allocates`"):
+        same(np.ones((2, 3)))
+    with pytest.raises(NumbaError):
+        first_row(np.ones((2, 3)))
+
+
+def test_what_borrows_makes_no_array() -> None:
+    @kernel()
+    def total(x: np.ndarray) -> float:
+        return float(np.zeros(3)[0] + x[0])
+
+    with pytest.raises(NumbaError, match="No implementation of function"):
+        total(np.ones(2))
+
+
+def test_what_is_given_an_array_to_keep_allocates_too() -> None:
+    @part(allocates=True)
+    def doubled(x: np.ndarray) -> np.ndarray:
+        return 2.0 * x
+
+    @kernel()
+    def borrowing(x: np.ndarray) -> float:
+        return doubled(x)[0]
+
+    @kernel(allocates=True)
+    def allocating(x: np.ndarray) -> float:
+        return doubled(x)[0]
+
+    with pytest.raises(TypeError, match=r"doubled, which returns an array, `allocates` too"):
+        borrowing(np.ones(2))
+    assert allocating(np.ones(2)) == 2.0
+
+
+def test_arrays_that_were_borrowed_are_freed() -> None:
+    @part(allocates=True)
+    def summed(rows: np.ndarray) -> float:
+        return (rows[0] + rows[1]).sum()
+
+    @kernel()
+    def total(rows: np.ndarray, out: np.ndarray) -> None:
+        out[0] = summed(rows[1:])
+
+    rows, out = np.ones((3, 4)), np.zeros(1)
+    before = sys.getrefcount(rows)
+    for _ in range(100):
+        total(rows, out)
+    assert out[0] == 8.0
+    assert sys.getrefcount(rows) == before

@@ -31,8 +31,8 @@ def test_layouts_of_blocks_of_any_length_fill_no_memory() -> None:
         many = kept_by(lambda: [decode_all(EstimateBlock, [one]) for one in payloads[100:]])
     finally:
         tracemalloc.stop()
-    assert 0 < few < 1_500_000
-    assert many < 500_000
+    assert 0 < few < 200_000
+    assert many < 100_000
 
 
 def test_a_layout_in_use_is_kept_while_others_come_and_go() -> None:

@@ -15,7 +15,7 @@ from tests.bus.rig import TestRig
 from tests.bus.samples import block
 from tests.bus.test_complete_subscription import alarm
 
-FEW, MANY = 66, 96
+FEW, MANY = 100, 130
 """Numbers of sessions: of 64 sources that are gone a reader keeps some notes."""
 MOST_BYTES = 750.0
 """Growth a session; a year has a thousand, and two per cent of a process are 0.7 MB [bytes]."""

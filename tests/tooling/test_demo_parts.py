@@ -4,6 +4,7 @@ import re
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -124,9 +125,20 @@ def test_each_fault_is_told_with_the_commands_to_look_at_it_and_to_acknowledge_i
     assert [line.partition("$ ")[2] for line in said if "$" in line] == [
         "rigwatch alarms rig.toml",
         "rigwatch ack rig.toml dry_friction",
-        "rigwatch alarms rig.toml",
         "rigwatch ack rig.toml other_fault",
     ]
+    advice = [line.strip() for line in said if "what to do" in line]
+    assert advice == ["what to do: Stop and look."] * 3  # one a name, of which departure came twice
+
+
+def test_where_nobody_watches_no_command_is_told_that_needs_the_running_rig() -> None:
+    said: list[str] = []
+    scenario = load_scenario(find_config("scenarios/demo.toml"))
+    narrator = Narrator(scenario, said.append, "rig.toml", attended=False)
+    narrator.alarm(alarm())
+    narrator.alarm(alarm(state="cleared_unacknowledged"))
+    assert any("what to do" in line for line in said)
+    assert not any("$" in line for line in said)
 
 
 def test_the_end_of_an_alarm_that_nobody_was_told_of_is_not_told() -> None:
@@ -169,13 +181,27 @@ def test_the_wait_for_the_next_fault_is_told_at_the_start_and_after_each_one() -
     assert "the next fault comes in 45 s" in said[-1]  # the scenario has begun anew
 
 
+def test_a_run_that_nobody_watches_ends_with_the_cause_told_or_a_while_after_the_name() -> None:
+    narrator = narrator_to([])
+    assert narrator.all_told_at(20.0) == inf
+    narrator.alarm(alarm("departure", 20 * RATE))
+    assert narrator.all_told_at(20.0) == inf
+    narrator.alarm(alarm("dry_friction", 21 * RATE))
+    assert narrator.all_told_at(20.0) == 41.0
+    narrator.explain(Event("monitor", 0, "error", PROBABLY_MISSING, "probably missing: x@load"))
+    assert narrator.all_told_at(20.0) == 29.0
+    assert narrator.all_told_at(inf) == inf
+
+
 def test_what_is_missing_in_the_model_is_told_and_other_events_are_not() -> None:
     said: list[str] = []
     narrator = narrator_to(said)
     found = "coulomb@load (dry surfaces resist sliding): explains 99% of the change"
     text = f"dry_friction: probably missing: {found}"
-    narrator.explain(Event("monitor", 0, "error", PROBABLY_MISSING, text))
     narrator.explain(Event("daq", 0, "warning", "CLOCK STEP", "the clock stepped"))
+    assert not narrator.explained
+    narrator.explain(Event("monitor", 0, "error", PROBABLY_MISSING, text))
+    assert narrator.explained
     assert [line.strip() for line in said] == [
         f"probably missing in the rig's model: {found}",
         f"({WHY_LATER})",
@@ -210,7 +236,7 @@ def test_an_alarm_about_the_measuring_chain_is_no_fault_of_the_plan() -> None:
     line = replace(alarm("stale", 5200), guidance="Run `rigwatch doctor CONFIG`.")
     narrator.alarm(line)
     assert "none of the faults announced" in said[-3]
-    assert "CONFIG" not in said[-2]
+    assert "rigwatch doctor rig.toml" in said[-2]
     narrator.alarm(replace(line, state="cleared_unacknowledged", seq=5300))
     assert any("Something else.: the condition has gone" in told for told in said)
     said.clear()

@@ -73,7 +73,7 @@ def bare_path(tmp_path: Path) -> Path:
     """A PATH with a shell's tools, and a Python that is too old."""
     folder = tmp_path / "bin"
     folder.mkdir()
-    for tool in ("sh", "dirname", "grep", "id", "env", "flock"):
+    for tool in ("sh", "dirname", "grep", "sed", "tr", "id", "env", "flock"):
         found = shutil.which(tool)
         assert found is not None
         (folder / tool).symlink_to(found)
@@ -109,10 +109,9 @@ def test_without_a_suitable_python_the_suitable_ones_are_named(
 @pytest.fixture
 def environment(bare_path: Path, tmp_path: Path) -> Path:
     """An environment with a pip that takes the packages of a lock file, but no refused one."""
-    for tool in ("sed", "cat"):
-        found = shutil.which(tool)
-        assert found is not None
-        (bare_path / tool).symlink_to(found)
+    found = shutil.which("cat")
+    assert found is not None
+    (bare_path / "cat").symlink_to(found)
     (tmp_path / "venv" / "bin").mkdir(parents=True)
     script(
         tmp_path / "venv" / "bin" / "python",
@@ -130,10 +129,24 @@ def test_the_set_up_says_how_far_it_is(environment: Path, bare_path: Path, tmp_p
     lock.write_text("".join(f"package{n}==1\n    --hash=sha256:0\n" for n in range(25)))
     done = run_tool("setup.sh", str(environment), str(lock), str(lock), path=bare_path)
     first, *rest = done.stdout.splitlines()
-    assert "lock.txt: 25 packages" in first
-    assert [line.split(":")[1].split()[0] for line in rest[:3]] == ["10", "20", "they"]
+    assert first == f"setup: 25 packages to run it ({lock})"
+    assert [line.split(":")[1].split()[0] for line in rest[:3]] == ["10", "20", "all"]
     assert rest[3:] == [first, *rest[:3]]
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_packages_that_are_there_already_are_not_counted_again(
+    environment: Path, bare_path: Path, tmp_path: Path
+) -> None:
+    packages = environment / "lib" / "python3.11" / "site-packages"
+    for there in ("Package_0-1", "package1-0.9", "package2-1"):
+        (packages / f"{there}.dist-info").mkdir(parents=True)
+    lock = tmp_path / "dev.txt"
+    names = ("package-0", "package1", "package2", "package22")
+    lock.write_text("".join(f"{name}==1 \\\n    --hash=sha256:0\n" for name in names))
+    done = run_tool("setup.sh", str(environment), str(lock), path=bare_path)
+    # Of package1 another version is there.
+    assert done.stdout.splitlines()[0] == f"setup: 2 packages to check it ({lock})"
 
 
 def test_only_the_lock_of_the_project_puts_the_project_in_and_is_compiled_as_a_whole(

@@ -251,6 +251,17 @@ def test_rates_that_no_device_has_are_refused(rate: str) -> None:
         parse(f"rate = {rate}\n", ImportMapping, "map.toml")
 
 
+def test_a_rate_that_no_device_has_is_refused_as_an_option_too(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    table = tmp_path / "a.csv"
+    table.write_text("x\n1\n2\n")
+    words = [str(table), str(tmp_path / "a.mcap"), "--map", "position=x[m]", "--rate", "1e-300"]
+    assert main(["import", *words]) == 2
+    told = capsys.readouterr().err
+    assert told == "rigwatch: options of import: rate: found 1e-300, expected float >= 1e-06\n"
+
+
 def test_output_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     path = tmp_path / "good.mcap"
     path.write_bytes(intact())

@@ -34,16 +34,22 @@ MISTAKES = [
     ("persistence", "persistance", "rig.toml:22: monitor.alarms.dry_friction.persistance: found an"
      " unknown key, expected 'persistence'"),
     ("persistence = 2", "persistence = 0", "rig.toml:22: monitor.alarms.dry_friction.persistence:"
-     " found 0, expected int >= 1"),
-    ("gain = 1e-6", 'gain = "a"', "rig.toml:12: channels[1].gain: found 'a', expected float"),
+     " found 0, expected a whole number >= 1"),
+    ("gain = 1e-6", 'gain = "a"', "rig.toml:12: channels[1].gain: found 'a', expected a number"),
     ('id = "bench1"', "", "rig.toml:1: rig.id: found no value, expected one: it is required"),
-    ('id = "bench1"', 'id = "a b"', "rig.toml:2: rig.id: found 'a b', expected str matching regex"
+    ('id = "bench1"', 'id = "a b"', "rig.toml:2: rig.id: found 'a b', expected text matching"
      " '^[A-Za-z0-9_-]+$'"),
     ('"serial"', '"serail"', "rig.toml:15: daq.device.adapter: found 'serail', expected one of"
      " modbus-rtu, modbus-tcp, plugin, replay, serial"),
     ("port", "prot", "rig.toml:16: daq.device.prot: found an unknown key, expected 'port'"),
     ("[monitor]", "[monitro]", "rig.toml:18: monitro: found an unknown key, expected 'monitor'"),
-    ('model = "model.toml"', 'model = 3', "rig.toml:19: monitor.model: found 3, expected str"),
+    ('model = "model.toml"', 'model = 3', "rig.toml:19: monitor.model: found 3, expected text"),
+    ("persistence = 2", "persistence = [2]", "rig.toml:22: monitor.alarms.dry_friction.persistence:"
+     " found [2], expected a whole number"),
+    ("[monitor]", "[monitor", "rig.toml:18: found a line that is not TOML (expected ']' at the end"
+     " of a table declaration at column 9), expected `key = value` or `[section]`"),
+    ("persistence = 2", "persistence =", "rig.toml:22: found a line that is not TOML (invalid value"
+     " at column 14), expected `key = value` or `[section]`"),
 ]  # fmt: skip
 
 

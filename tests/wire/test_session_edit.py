@@ -142,6 +142,7 @@ def test_trim_refuses_an_empty_span_and_keeps_no_file(
     ) in capsys.readouterr().err
     span = ["--start", "2", "--end", "1"]
     assert main(["trim", str(session), str(target), *span]) == 2
+    assert "--end: found 1, expected a time after --start 2" in capsys.readouterr().err
     between = ["--start", "3.91", "--end", "4.29"]  # only the gap lies there
     assert main(["trim", str(session), str(target), *between]) == 2
     assert main(["trim", str(session), str(target), "--start", "soon"]) == 2

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from rigwatch.commands import main
+from rigwatch.commands.catalogue.effect_table import listed
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import Model, shipped_models
 from rigwatch.wire.typed_files.loading import parse
 from rigwatch.workbench.catalogue import effect_curves, model_report, text_plot
-from rigwatch.workbench.effect_table import listed
 
 GUIDE = Path(__file__).parents[2] / "docs" / "models.md"
 SNIPPETS = re.findall(r"```toml\n(.*?)```", GUIDE.read_text("utf-8"), re.DOTALL)

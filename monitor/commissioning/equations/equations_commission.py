@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 
+from monitor.commissioning.end_stop import hit_stops
 from monitor.commissioning.equations.equations_model import equations_model
 from monitor.commissioning.equations.fitted_equations import (
     fitted_equations,
@@ -125,6 +126,10 @@ def _commissioned(
     say("1 of 3: parameters of the equations")
     plant = fitted_equations(used, name, CORNER, rate, jitters)
     say("2 of 3: what the healthy rig leaves of them")
-    parts, roles, remainder, scheme = healthy_remainder(used, plant, rate, jitters)
+    try:
+        parts, roles, remainder, scheme = healthy_remainder(used, plant, rate, jitters)
+    except ModelError as error:
+        stops = hit_stops(used, base_model(name))
+        raise ModelError(f"{stops} ({error})" if stops else str(error)) from error
     say("3 of 3: limits of the healthy rig")
     return equations_model(used, plant, remainder, scheme, parts, roles, rate)

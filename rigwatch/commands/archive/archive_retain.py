@@ -61,17 +61,13 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _rules(arguments: argparse.Namespace) -> "RecorderSection":
-    import msgspec
-
     from rigwatch.wire.rig_config import RecorderSection
+    from rigwatch.wire.typed_files import converted
 
     limits = {name: getattr(arguments, name) for name in _LIMITS}
     if not any(limits.values()):
         raise ArchiveError("retain: found no limit, expected --keep-days, --keep-gigabytes, …")
-    try:
-        return msgspec.convert(limits, RecorderSection)
-    except msgspec.ValidationError as error:
-        raise ArchiveError(f"retain: {error}") from None
+    return converted(limits, RecorderSection, "retain")
 
 
 def _lines(found: "Retained", *, removed: bool) -> list[str]:

@@ -1,1 +1,1 @@
-"""Commands on what there is to choose from: effects and models."""
+"""Commands on what there is to choose from: effects, with their library as text, and models."""

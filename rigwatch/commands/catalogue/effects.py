@@ -29,10 +29,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _describe(arguments: argparse.Namespace) -> int:
+    from rigwatch.commands.catalogue.effect_table import described
     from rigwatch.physics.engine.equations import library
     from rigwatch.wire.errors import ModelError, nearest
     from rigwatch.workbench.catalogue import effect_curves
-    from rigwatch.workbench.effect_table import described
 
     name, known = arguments.name, library()
     if name not in known:
@@ -47,7 +47,7 @@ def _describe(arguments: argparse.Namespace) -> int:
 
 
 def _list(arguments: argparse.Namespace) -> int:
-    from rigwatch.workbench.effect_table import KINDS, listed
+    from rigwatch.commands.catalogue.effect_table import KINDS, listed
 
     found = listed()
     lines: list[str] = []

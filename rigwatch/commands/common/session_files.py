@@ -41,12 +41,13 @@ def span_between(
     """Times given as texts [ns], None if not given.
 
     Raises:
-        SessionError: one of them is not a time.
+        SessionError: one of them is not a time, or the end is not after the start.
     """
-    return (
-        None if start is None else point_in_time(start, session, "--start"),
-        None if end is None else point_in_time(end, session, "--end"),
-    )
+    begins = None if start is None else point_in_time(start, session, "--start")
+    ends = None if end is None else point_in_time(end, session, "--end")
+    if begins is not None and ends is not None and ends <= begins:
+        raise SessionError(f"--end: found {end}, expected a time after --start {start}")
+    return begins, ends
 
 
 def point_in_time(text: str, session: "Session", option: str) -> int:

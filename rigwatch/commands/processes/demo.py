@@ -3,6 +3,7 @@
 import argparse
 import json
 from contextlib import nullcontext
+from math import inf
 from pathlib import Path
 
 from rigwatch.commands.common import POSITIVE, say
@@ -11,8 +12,8 @@ HELP = "run a simulated rig: friction appears, an alarm names it, a recording re
 EXAMPLE = """  rigwatch demo
   rigwatch demo --headless --seconds 35
   rigwatch demo --commission-only"""
-LONGEST, AFTER_NAMED = 150.0, 8.0
-"""Time from the naming of friction to the end of a headless run, at most one cycle [s]."""
+LONGEST, AFTER_NAMED = 150.0, 20.0
+"""Longest headless run, and longest time in it after friction is named; within one cycle [s]."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--headless",
         action="store_true",
-        help="no window; ends once friction is named, with exit code 0 only if it is",
+        help="no window; ends soon after friction is named, with exit code 0 only if it is",
     )
     parser.add_argument("--seconds", type=POSITIVE, metavar="N", help="maximum run time [s]")
     parser.add_argument(
@@ -46,19 +47,21 @@ def _run(arguments: argparse.Namespace, folder: Path) -> int:
     from rigwatch.wire.typed_files import find_config
 
     config = find_config("demo.toml")
+    say(f"all that the demo writes is in the folder {folder}, which may be deleted afterwards")
     ensure_model(config, folder, say)
     if arguments.commission_only:
         return 0
     forget_alarms(folder)
     rig = write_rig_file(config, folder, "web" if arguments.headless else "auto")
-    seconds, after_named = float("inf"), float("inf")
+    seconds, after_named = inf, inf
     if arguments.headless:
         seconds, after_named = LONGEST, AFTER_NAMED
     if arguments.seconds is not None:
-        seconds, after_named = arguments.seconds, float("inf")
+        seconds, after_named = arguments.seconds, inf
     beside = nullcontext() if arguments.headless else workbench_pages(folder, rig, say)
     with beside:
-        outcome = Show(rig, folder, say).play(seconds, after_named)
+        show = Show(rig, folder, say, attended=not arguments.headless)
+        outcome = show.play(seconds, after_named)
     if arguments.json:
         print(json.dumps(outcome.as_dict(), indent=1))
     # Whoever watches may end the demo before friction appears; a crash is a failure even then.

@@ -142,7 +142,7 @@ def _mapping(arguments: argparse.Namespace) -> "ImportMapping":
     import msgspec
 
     from rigwatch.wire.exchange import ImportMapping, parse_map_option
-    from rigwatch.wire.typed_files import load
+    from rigwatch.wire.typed_files import converted, load
 
     mapping = load(arguments.mapping, ImportMapping) if arguments.mapping else ImportMapping()
     given: dict[str, Any] = {
@@ -153,8 +153,5 @@ def _mapping(arguments: argparse.Namespace) -> "ImportMapping":
     if arguments.columns:
         given["columns"] = tuple(arguments.columns.split(","))
     given["channels"] = mapping.channels | dict(map(parse_map_option, arguments.map))
-    try:
-        merged = msgspec.to_builtins(msgspec.structs.replace(mapping, **given))
-        return msgspec.convert(merged, ImportMapping)
-    except msgspec.ValidationError as error:
-        raise ImportDataError(f"options of import: {error}") from None
+    merged = msgspec.to_builtins(msgspec.structs.replace(mapping, **given))
+    return converted(merged, ImportMapping, "options of import")

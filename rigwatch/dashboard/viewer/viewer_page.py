@@ -4,6 +4,7 @@ As shipped, the page reports usage, asks for updates and loads fonts and example
 with no switch for that. The rule is a Content-Security-Policy, which browsers enforce.
 """
 
+import contextlib
 import http.client
 import threading
 import urllib.error
@@ -67,6 +68,11 @@ class _Handler(BaseHTTPRequestHandler):
     source = ""
     rule = ""
     start = "/"
+
+    def handle(self) -> None:
+        """Answer; a browser may go away in the middle of it, as when its page is closed."""
+        with contextlib.suppress(ConnectionError):
+            super().handle()
 
     def do_GET(self) -> None:
         """Forward the viewer's content at this path; the bare page gets the address of its data."""

@@ -50,7 +50,7 @@ def _between(nominal: FloatArray, k: int, share: float, xs: FloatArray) -> None:
             xs[i] += share * (nominal[k + 1, i] - nominal[k, i])
 
 
-@kernel(error_model="numpy")
+@kernel(allocates=True, error_model="numpy")
 def sweep(  # noqa: C901, PLR0917 -- a kernel
     rates: int, read: int, u: FloatArray, dt: float, first: int, hold: FloatArray, a: FloatArray,
     b: FloatArray, c: FloatArray, apart: bool, nominal: FloatArray, p: FloatArray, s: FloatArray,
@@ -100,7 +100,7 @@ def sweep(  # noqa: C901, PLR0917 -- a kernel
         _add(dt, b, ks, s)
 
 
-@kernel(error_model="numpy")
+@kernel(allocates=True, error_model="numpy")
 def slopes_along(  # noqa: PLR0917 -- a kernel
     values: int, u: FloatArray, dt: float, first: int, nominal: FloatArray, p: FloatArray,
     value: FloatArray, slopes: FloatArray,
@@ -116,7 +116,7 @@ def slopes_along(  # noqa: PLR0917 -- a kernel
         )  # fmt: skip
 
 
-@kernel(error_model="numpy")
+@kernel(allocates=True, error_model="numpy")
 def forward(  # noqa: PLR0917 -- a kernel
     step: int, u: FloatArray, dt: float, row: int, substeps: int, hold: FloatArray,
     x: FloatArray, p: FloatArray, s: FloatArray,

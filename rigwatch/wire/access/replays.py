@@ -7,7 +7,7 @@ import threading
 from rigwatch.wire.access.statement import Proof
 from rigwatch.wire.errors import KeysError
 
-KEPT = 1024
+KEPT = 256
 """Number of nonces stored per signer."""
 
 

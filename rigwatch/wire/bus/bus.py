@@ -57,7 +57,7 @@ class Bus(Member):
 
     def _subscribed(self, topic: Topic, keys: Iterable[str], capacity: int) -> Subscription:
         found = Subscription(topic, capacity)
-        ends = [self.transport.listen(self.key(key), found.receive) for key in keys]
+        ends = [self.transport.listen_from(self.key(key), found.receive) for key in keys]
 
         def close() -> None:
             for end in ends:

@@ -59,12 +59,8 @@ class MemoryTransport:
         """Send to all subscribers."""
         self._network.deliver(key, payload, self.identity, mark)
 
-    def listen(self, key: str, receive: Callable[[bytes], None]) -> Close:
-        """Call `receive` with each payload put to `key`."""
-        return self.listen_from(key, lambda payload, *_: receive(payload))
-
     def listen_from(self, key: str, receive: Receive) -> Close:
-        """The same with the identity of the sender and the mark."""
+        """Call `receive` with each payload put to `key`, its sender's identity and its mark."""
         return self._register(self._network.listeners.setdefault(key, []), receive)
 
     def listen_waiting(self, key: str, receive: Receive) -> tuple[Take | None, Close]:

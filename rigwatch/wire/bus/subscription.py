@@ -9,15 +9,20 @@ from typing import Any
 from rigwatch.wire.bus.transport import MAX_PAYLOAD, Close
 from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import Topic, decode
+from rigwatch.wire.ordering import SenderRates
 
 MOST_COMMANDS = 8
 """Operators' commands executed per turn of a loop, so that a flood of them delays nothing else."""
+MOST_LIMITED = 1.0
+"""Rate in normal running up to which a topic's messages are few [Hz]."""
 QUEUE_CAPACITY = 4096
 """Number of messages queued for a slow reader before the oldest are dropped."""
 
 
 class Subscription:
     """Messages of one topic in a bounded queue; the oldest are dropped when it is full.
+
+    Of a topic whose messages are few, each client may send no more than its share (`SenderRates`).
 
     Attributes:
         dropped: messages dropped because the reader was slow.
@@ -29,16 +34,24 @@ class Subscription:
         self.dropped = 0
         self.rejected = 0
         self._capacity = capacity
+        self._rates = SenderRates() if topic.rate_hz <= MOST_LIMITED else None
         self._waiting: SimpleQueue[bytes] = SimpleQueue()
         self._close: Close = lambda: None
 
     def __len__(self) -> int:
         return self._waiting.qsize()
 
-    def receive(self, payload: bytes) -> None:
+    @property
+    def refused(self) -> int:
+        """Messages dropped because their client sent more than its share."""
+        return self._rates.refused if self._rates else 0
+
+    def receive(self, payload: bytes, sender: str = "", _mark: bytes = b"") -> None:
         """Accept one payload from the transport; never waits, never raises."""
         if len(payload) > MAX_PAYLOAD:
             self.rejected += 1
+            return
+        if self._rates and not self._rates.admits(sender, len(payload), time.monotonic()):
             return
         if self._waiting.qsize() >= self._capacity:
             with contextlib.suppress(Empty):

@@ -28,11 +28,11 @@ class Transport(Protocol):
     def put(self, key: str, payload: bytes, mark: bytes = b"") -> None:
         """Send with a `mark`, without waiting; dropped if the link is full or down."""
 
-    def listen(self, key: str, receive: Callable[[bytes], None]) -> Close:
-        """Call `receive` with each payload put to `key`, in the transport's own thread."""
-
     def listen_from(self, key: str, receive: Receive) -> Close:
-        """The same with the sender's `identity`, "" if unknown, and the mark."""
+        """Call `receive` with each payload put to `key`, in the transport's own thread.
+
+        With it come the sender's `identity`, "" if unknown, and the mark.
+        """
 
     def listen_waiting(self, key: str, receive: Receive) -> tuple[Take | None, Close]:
         """The same, where messages may wait for calls of the function returned; None: they don't.

@@ -252,13 +252,8 @@ class ZenohTransport:
                 self._publishers[key] = publisher, zenoh.SourceInfo(publisher.id, 0)
             return self._publishers[key]
 
-    def listen(self, key: str, receive: Callable[[bytes], None]) -> Close:
-        """Call `receive` with each payload put to `key`, in Zenoh's own thread."""
-        take = _direct(lambda sample: receive(sample.payload.to_bytes()))
-        return self._keep(self._session.declare_subscriber(key, take))
-
     def listen_from(self, key: str, receive: Receive) -> Close:
-        """The same with the identity of the sender and the mark."""
+        """Call `receive` with each payload put to `key`, its sender and mark, in Zenoh's thread."""
         take = _direct(lambda s: receive(s.payload.to_bytes(), _sender(s), _mark(s)))
         return self._keep(self._session.declare_subscriber(key, take))
 

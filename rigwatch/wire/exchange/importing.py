@@ -65,7 +65,10 @@ def import_file(source: Path, target: Path, mapping: ImportMapping, start_ns: in
         return _write(found, target, mapping, rate, (f"imported from {source.name}",))
     if not mapping.channels:
         columns = ", ".join(table.names)
-        raise ImportDataError(f"{source}: no channel is mapped, its columns are {columns}")
+        raise ImportDataError(
+            f"{source}: no channel is mapped, its columns are {columns};"
+            " expected --map 'CHANNEL=COLUMN[UNIT]' or --mapping"
+        )
     base, remarks = _time_base(table, mapping)
     remarks = (f"imported from {source.name}", *remarks)
     found = _sample_blocks(table, base, mapping, start_ns)

@@ -1,6 +1,6 @@
 """Decodes short blocks as they come over the bus: their numbers are gathered in one go.
 
-    payload ──one index──▶ times │ values │ quality ──views──▶ arrays of the block's own
+    payload ──one index──▶ times │ values ──views──▶ arrays of the block's own
 
 A view and a copy for each column cost more than the numbers of a block of some samples. Payloads
 that wait together and follow one another become one block, with the objects of one.
@@ -8,6 +8,7 @@ that wait together and follow one another become one block, with the objects of 
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,8 @@ from rigwatch.wire.messages.packed import (
     layout_of,
 )
 
+_I8 = np.dtype("<i8")
+T = TypeVar("T", bound=np.generic)
 Numbers = tuple[IntArray, FloatArray, ByteArray]
 """Times, values and quality, each with the samples in the last axis."""
 
@@ -142,10 +145,18 @@ def _by_layout(run: Sequence[_Part]) -> Collection[list[int]]:
 
 def _gathered(layout: Layout, parts: Sequence[_Part]) -> Numbers:
     """Times, values and quality of payloads of one layout; the first axis is the payload."""
-    raw = np.frombuffer(b"".join([part.data for part in parts]), np.uint8)
-    numbers = raw.reshape(len(parts), -1).take(layout.numbers, axis=1)
-    n, times = layout.samples, len(layout.times)
-    eights = 8 * n * (times + len(layout.columns))
-    words: NDArray[np.int64] = numbers[:, :eights].view(np.int64).reshape(len(parts), -1, n)
-    values = words[:, times:].view(np.float64)
-    return words[:, :times], values, numbers[:, eights:].reshape(len(parts), -1, n)
+    raw, times = b"".join([part.data for part in parts]), len(layout.times)
+    # The eight bytes from each byte on; an index takes those that are a number.
+    eights: IntArray = np.ndarray((len(raw) - 7,), _I8, raw, strides=(1,))
+    words = _taken(eights, layout.words, len(raw), len(parts))
+    flags = _taken(np.frombuffer(raw, np.uint8), layout.flags, len(raw), len(parts))
+    return words[:, :times], words[:, times:].view(np.float64), flags
+
+
+def _taken(raw: NDArray[T], places: NDArray[np.intp], size: int, parts: int) -> NDArray[T]:
+    """What is at these places of each of the parts of equal size; the first axis is the part."""
+    if not places.size:
+        return np.empty((parts, *places.shape), raw.dtype)
+    starts = np.arange(0, size, size // parts)[:, None, None]
+    found: NDArray[T] = raw[places][None] if parts == 1 else raw[starts + places]
+    return found

@@ -36,10 +36,12 @@ def continues(first: Block, second: Block) -> bool:
 def _same_layout(first: Sequence[Column], second: Sequence[Column]) -> bool:
     if isinstance(first, ColumnTable) and isinstance(second, ColumnTable):
         return first.names == second.names
-    return len(first) == len(second) and all(
-        a.name == b.name and a.unit == b.unit and bool(len(a.quality)) == bool(len(b.quality))
-        for a, b in zip(first, second, strict=True)
-    )
+    if len(first) != len(second):
+        return False
+    for a, b in zip(first, second, strict=True):
+        if a.name != b.name or a.unit != b.unit or bool(a.quality.size) != bool(b.quality.size):
+            return False
+    return True
 
 
 def concatenate(blocks: Sequence[B]) -> B:

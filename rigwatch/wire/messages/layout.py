@@ -59,13 +59,16 @@ class Layout:
         return () if judged else tuple((place.name, place.unit) for place in self.columns)
 
     @cached_property
-    def numbers(self) -> NDArray[np.intp]:
-        """Offsets of all bytes of the times, then of the values, then of the quality."""
-        eights = [*self.times, *(place.values for place in self.columns)]
-        ones = [place.quality for place in self.columns if place.quality >= 0]
-        spans = [np.arange(at, at + _EIGHT * self.samples) for at in eights]
-        spans += [np.arange(at, at + self.samples) for at in ones]
-        return np.concatenate(spans)
+    def words(self) -> NDArray[np.intp]:
+        """Offsets of the times, then of the values; shape (times and columns, samples)."""
+        starts = [*self.times, *(place.values for place in self.columns)]
+        return np.add.outer(starts, _EIGHT * np.arange(self.samples))
+
+    @cached_property
+    def flags(self) -> NDArray[np.intp]:
+        """Offsets of the quality of the columns that have it; shape (columns, samples)."""
+        starts = [place.quality for place in self.columns if place.quality >= 0]
+        return np.add.outer(np.array(starts, np.intp), np.arange(self.samples))
 
     def head(self, data: bytes) -> tuple[str, int, int]:
         """Device, boot and number of the first sample.

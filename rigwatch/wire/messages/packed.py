@@ -7,6 +7,7 @@ further block. Anything that this module does not recognise is left to `protobuf
 reports the error.
 """
 
+import sys
 from collections.abc import Set
 from typing import Any, TypeVar
 
@@ -33,7 +34,7 @@ MOST_LAYOUTS, LAYOUTS_ROOM = 48, 1 << 16
 """Layouts kept in a generation, and the sum of their blocks' sizes [bytes].
 
 A live block has few lengths, but a busy machine makes some that hardly come again, and offsets take
-eight times the memory of a block. Little room is full within minutes; much of it fills for a year.
+the memory of a block. Little room is full within minutes; much of it fills for a year.
 """
 _TAGS = {kind: schema.field_tags(kind) for kind in (SampleBlock, EstimateBlock)}
 _DEVICE, _BOOT, _SEQ = (_TAGS[SampleBlock][name] for name in ("device", "boot", "seq"))
@@ -136,7 +137,8 @@ def _column(data: bytes, span: Span, n: int) -> ColumnPlace:
     quality = _only(fields[_QUALITY]) if _QUALITY in fields else (-1, n - 1)
     if values[1] - values[0] != n * _F8.itemsize or quality[1] - quality[0] != n:
         raise UnfamiliarError
-    name, unit = (_text(data, fields.get(tag)) for tag in (_NAME, _UNIT))
+    # Layouts share their names.
+    name, unit = (sys.intern(_text(data, fields.get(tag))) for tag in (_NAME, _UNIT))
     return ColumnPlace(name, unit, values[0], quality[0])
 
 

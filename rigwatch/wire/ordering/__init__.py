@@ -3,7 +3,7 @@
 `sample_order` orders received samples and reports losses (`outcomes`), `stream` keeps those of one
 boot until their turn, `source_arbitration` decides which of several sources has control,
 `ownership` which process may send for it, and `ring_protocol` defines a reader's queries to a ring.
-Samples and numbered messages use the same logic.
+Samples and numbered messages use the same logic. `sender_rates` bounds what each client may send.
 """
 
 from rigwatch.wire.ordering.numbered import Numbered
@@ -18,6 +18,7 @@ from rigwatch.wire.ordering.outcomes import (
 from rigwatch.wire.ordering.ownership import Owners
 from rigwatch.wire.ordering.ring_protocol import OPEN, UNKNOWN, Ask, RingReply
 from rigwatch.wire.ordering.sample_order import LARGEST_SEQ, SampleOrder
+from rigwatch.wire.ordering.sender_rates import SenderRates
 
 __all__ = [
     "FORGED",
@@ -34,4 +35,5 @@ __all__ = [
     "Remark",
     "RingReply",
     "SampleOrder",
+    "SenderRates",
 ]

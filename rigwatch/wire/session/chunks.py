@@ -118,7 +118,8 @@ def _scan_records(file: BinaryIO, magic: bytes, size: int) -> Iterator[Chunk | D
                 unread = end
             else:
                 _check_other(head[0], body)
-                _check_length(file, offset, body, size)
+                if _ZSTD in body:
+                    _check_length(file, offset, body, size)
             offset = end
         except DamagedError as damage:
             # No checksum protects what lies between chunks: a record there may end too late.
@@ -187,11 +188,10 @@ def _check_other(opcode: int, body: bytes) -> None:
 
 def _check_length(file: BinaryIO, offset: int, body: bytes, size: int) -> None:
     """Raise if a whole chunk begins within a record, which its length must not span."""
-    inside = list(_candidates(body, offset + RECORD.size))
+    inside = _candidates(body, offset + RECORD.size)
     if any(_chunk_at(file, candidate, size) for candidate in inside if candidate > offset):
         raise DamagedError("a record of a damaged length")
-    if inside:
-        file.seek(offset + RECORD.size + len(body))
+    file.seek(offset + RECORD.size + len(body))
 
 
 def next_chunk(file: BinaryIO, start: int, size: int) -> int:

@@ -4,7 +4,7 @@ as typed values.
 
 from rigwatch.wire.typed_files.bounded import loads
 from rigwatch.wire.typed_files.json_values import JsonError, as_json, decoded, json_value
-from rigwatch.wire.typed_files.loading import Section, load, parse, read_text
+from rigwatch.wire.typed_files.loading import Section, converted, load, parse, read_text
 from rigwatch.wire.typed_files.overlay import holder, load_layered, whole_text
 from rigwatch.wire.typed_files.shipped import copy_out, find_config, find_file, shipped_names
 from rigwatch.wire.typed_files.writing import as_toml
@@ -14,6 +14,7 @@ __all__ = [
     "Section",
     "as_json",
     "as_toml",
+    "converted",
     "copy_out",
     "decoded",
     "find_config",

@@ -20,6 +20,16 @@ _PLACE = re.compile(r" - at `(?:key in )?\$(?P<path>[^`]*)`$")
 _UNKNOWN = re.compile(r"Object contains unknown field `(?P<key>[^`]+)`")
 _MISSING = re.compile(r"Object missing required field `(?P<key>[^`]+)`")
 _HEADER = re.compile(r"\s*\[(?P<array>\[)?\s*(?P<name>[^\]]+?)\s*\]")
+TYPES = {
+    "int": "a whole number",
+    "float": "a number",
+    "str": "text",
+    "bool": "true or false",
+    "array": "a list",
+    "object": "a table",
+}
+"""Types as the author of a file calls them."""
+_TYPE = re.compile(rf"\b({'|'.join(TYPES)})\b")
 _STEP = re.compile(r"\.?([^.\[\]]+)|\[(\d+|\.\.\.)\]")
 
 
@@ -61,7 +71,15 @@ def _expected(reason: str, schema: Any) -> str:
         return f"one of {', '.join(sorted(struct.tag for struct in _structs(schema)))}"
     if isinstance(schema, msgspec.inspect.LiteralType):
         return f"one of {', '.join(str(value) for value in schema.values)}"
-    return reason.removeprefix("Expected ").split(", got ")[0].replace("`", "")
+    return _in_words(reason.removeprefix("Expected ").split(", got ")[0].replace("`", ""))
+
+
+def _in_words(expected: str) -> str:
+    """What msgspec expects, such as "int >= 1", with words for the names of types."""
+    types, pattern, regex = expected.partition(" matching regex ")
+    types = types.removesuffix(" | null")  # TOML has none
+    named = _TYPE.sub(lambda match: TYPES[match[0]], types).replace(" | ", " or ")
+    return f"{named} matching {regex}" if pattern else named
 
 
 def _near(key: str, schema: Any, value: Any) -> str:

@@ -5,6 +5,7 @@ of range becomes a `ConfigError`: one line with file, line, key, what was found 
 expected.
 """
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,6 +17,8 @@ from rigwatch.wire.typed_files.bounded import loads
 from rigwatch.wire.typed_files.explanation import explained
 
 S = TypeVar("S", bound="Section")
+LINES = "`key = value` or `[section]`"
+_AT = re.compile(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)")
 
 
 class Section(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
@@ -37,7 +40,21 @@ def parse(text: str, kind: type[S], file: Path | str) -> S:
     Raises:
         ConfigError: the text is not TOML or is not a valid `kind`.
     """
-    raw = tables(text, file)
+    return converted(tables(text, file), kind, file, text)
+
+
+def converted(raw: dict[str, Any], kind: type[S], file: Path | str, text: str = "") -> S:
+    """Plain values as a struct of class `kind`.
+
+    Args:
+        raw: the values by key.
+        kind: the class.
+        file: named in errors: where the values come from.
+        text: of the file, for the line of an error.
+
+    Raises:
+        ConfigError: they are not a valid `kind`.
+    """
     try:
         return msgspec.convert(raw, kind)
     except msgspec.ValidationError as error:
@@ -53,7 +70,18 @@ def tables(text: str, file: Path | str) -> dict[str, Any]:
     try:
         return loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise ConfigError(file, "", str(error), "TOML") from error
+        raise _malformed(file, str(error)) from error
+
+
+def _malformed(file: Path | str, complaint: str) -> ConfigError:
+    """The error for a complaint such as "Invalid value (at line 3, column 9)"."""
+    match = _AT.fullmatch(complaint)
+    if match is None:
+        return ConfigError(file, "", complaint, "TOML")
+    what, line, column = match.groups()
+    place = f"column {column}" if line else "the end"
+    found = f"a line that is not TOML ({what[0].lower()}{what[1:]} at {place})"
+    return ConfigError(file, "", found, LINES, int(line) if line else None)
 
 
 def read_text(path: Path) -> str:

@@ -15,7 +15,12 @@ import numpy as np
 from msgspec import structs
 
 from rigwatch.physics.engine.compile import compile_system, side_by_side
-from rigwatch.physics.engine.equations import Model, along_measured_motion, compose
+from rigwatch.physics.engine.equations import (
+    Model,
+    along_measured_motion,
+    compose,
+    unmoved_at_rest,
+)
 from rigwatch.physics.engine.fit import Recording, beginning
 from rigwatch.physics.engine.search import WholeRuns
 from rigwatch.wire.arrays import FloatArray
@@ -105,7 +110,10 @@ def _tried(
 
 def _along(study: Study, names: Sequence[str]) -> Model:
     """The model with these variants along the measured motion, with the study's sensors, holds."""
-    model, known = along_measured_motion(varied(study, names).model), study.model.parameters
+    model, known = (
+        along_measured_motion(unmoved_at_rest(varied(study, names).model)),
+        study.model.parameters,
+    )
     sensors = [n for o in model.outputs.values() for n in (o.late, o.corner) if n in known]
     parameters = model.parameters | {n: known[n] for n in sensors if not known[n].kept}
     return structs.replace(model, inputs=study.model.inputs, parameters=parameters)

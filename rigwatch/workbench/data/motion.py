@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 from msgspec import structs
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from rigwatch.physics.engine.equations import (
     Model,
@@ -18,6 +19,7 @@ from rigwatch.physics.engine.equations import (
     has_hidden_states,
     measured_states,
     predicted_outputs,
+    unmoved_at_rest,
 )
 from rigwatch.physics.engine.fit import (
     Recording,
@@ -35,6 +37,10 @@ SETTLING = 1.0
 SLOW = 0.05
 """Speed over its rms below which samples do not count: there a smoothed motion does not show
 the direction of sliding, nor whether the rig sticks."""
+STUCK = 5
+"""Samples over which a rig that is not moving moves less than at that speed in one of them."""
+BESIDE = 9
+"""Samples about a rest that do not count: smoothing spreads the instant in which a rig stops."""
 UNCHECKED = (
     "no healthy recording: the model cannot be checked; record one with nothing wrong and list it"
     " under [[healthy]]"
@@ -66,7 +72,7 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
     Raises:
         ModelError: no channel measures any of the model's states, or no output is left to predict.
     """
-    model = along_measured_motion(study.model)
+    model = along_measured_motion(unmoved_at_rest(study.model))
     # One width for all recordings: the smoothing is part of the fitted model.
     shown_by = data.healthy or data.train
     widths = motion_widths(study.model, shown_by)
@@ -81,7 +87,7 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
         whole = motion_recording(
             study.model, recording, settling=settling, widths=widths, late=late
         )
-        return _while_moving(study, whole, slow)
+        return _while_moving(study, _with_rests(study, whole, slow), slow)
 
     healthy = made(data.healthy) if data.healthy is not None else None
     train, held_out = made(data.train), made(data.held_out)
@@ -130,13 +136,37 @@ def _lateness_remark(channel: str, late: float) -> str:
     return LATE.format(channel=channel, late=1e3 * abs(late), side=side)
 
 
+def _with_rests(study: Study, recording: Recording, slow: FloatArray) -> Recording:
+    """The recording with rates of exactly zero where the motion rests, see `unmoved_at_rest`.
+
+    Args:
+        study: whose model has states that are measured.
+        recording: along the measured motion.
+        slow: rate of each input that is hardly one, shape (inputs,).
+    """
+    measured = list(enumerate(measured_states(study.model), start=len(study.model.inputs)))
+    places = {state.channel: column for column, state in measured if state.order == 0}
+    inputs = recording.inputs.copy()
+    for column, state in measured:
+        if state.order == 1 and state.channel in places:
+            position, rate = inputs[:, places[state.channel]], inputs[:, column]
+            moved = maximum_filter1d(position, STUCK) - minimum_filter1d(position, STUCK)
+            still = moved <= slow[column] * recording.dt
+            still &= maximum_filter1d(np.abs(rate), STUCK) < slow[column]
+            inputs[maximum_filter1d(still, STUCK), column] = 0.0
+    return replace(recording, inputs=inputs)
+
+
 def _while_moving(study: Study, recording: Recording, slow: FloatArray) -> Recording:
     """The recording without samples at which a measured rate is slower than `slow`, (inputs,)."""
     measured = enumerate(measured_states(study.model), start=len(study.model.inputs))
     rates = [column for column, state in measured if state.order == 1]
     if not rates or recording.thinning is not None:
         return recording
-    still = np.any(np.abs(recording.inputs[:, rates]) < slow[rates], axis=1)
+    speeds = recording.inputs[:, rates]
+    still = np.any(np.abs(speeds) < slow[rates], axis=1)
+    still |= maximum_filter1d(np.any(speeds == 0.0, axis=1), BESIDE)
+    still[1:] |= np.any(speeds[1:] * (2.0 * speeds[1:] - speeds[:-1]) < 0.0, axis=1)
     return replace(recording, outputs=np.where(still[:, None], np.nan, recording.outputs))
 
 

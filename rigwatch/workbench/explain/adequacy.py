@@ -7,7 +7,8 @@ the fault are looked at; the study's file is not changed, and the verdict says w
 """
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from msgspec import structs
@@ -54,27 +55,47 @@ def inadequate(bench: Bench) -> Verdict | None:
 
     A rough model is compared with its own residual on a healthy recording and skips this check.
     """
-    if (known := _on_healthy(bench)) is None:
+    healthy = _on_healthy(bench)
+    if healthy is None or healthy.adequate:
         return None
-    error, noise = known
-    ratio = noise.ratio(error)
-    if ratio <= MOST:
-        return None
-    channel = _worst(bench.study.model, error.rms / noise.rms)
+    channel = _worst(bench.study.model, healthy.error.rms / healthy.noise.rms)
     text = (
-        f"the error on the healthy recording is {ratio:.3g} times its noise (worst: {channel};"
-        f" {METHODS[noise.method]}), expected at most {MOST:g}: {ADVICE}"
+        f"the error on the healthy recording is {healthy.ratio:.3g} times its noise (worst:"
+        f" {channel}; {METHODS[healthy.noise.method]}), expected at most {MOST:g}: {ADVICE}"
     )
     return Verdict("model_inadequate", None, (), (), text)
 
 
-def _on_healthy(bench: Bench) -> tuple[Fit, NoiseFloor] | None:
-    """The model's fit to the healthy recording, and its noise there; None if it is not checked."""
+@dataclass(frozen=True)
+class _OnHealthy:
+    """The model on the healthy recording.
+
+    Attributes:
+        error: its fit there.
+        noise: of the recording.
+    """
+
+    error: Fit
+    noise: NoiseFloor
+
+    @cached_property
+    def ratio(self) -> float:
+        """The error over the noise, over all channels [1]."""
+        return self.noise.ratio(self.error)
+
+    @property
+    def adequate(self) -> bool:
+        """Whether the model describes the healthy rig."""
+        return self.ratio <= MOST
+
+
+def _on_healthy(bench: Bench) -> _OnHealthy | None:
+    """The model on the healthy recording; None if it is not checked there."""
     healthy, bare = bench.data.of_healthy, bench.bare
     if healthy is None or bare is None or bench.study.model.rough:
         return None
     noise = from_residual(bare.train, healthy.train, bench.study.file.period, healthy.horizon)
-    return bare.train, noise
+    return _OnHealthy(bare.train, noise)
 
 
 def stopped_by_outliers(bench: Bench, found: Verdict) -> Verdict:
@@ -169,8 +190,11 @@ def with_adequate_base(bench: Bench, progress: Progress) -> Bench:
         bench: of a study; one with accepted effects keeps its base.
         progress: called with a line of text as each fit begins.
     """
-    lacks = _is_inadequate(bench)
-    if not (lacks or _leaves_more_than_noise(bench)) or not _may_search(bench):
+    if not _may_search(bench):
+        return bench
+    healthy = _on_healthy(bench)
+    lacks = _is_inadequate(bench, healthy)
+    if not lacks and not _leaves_more_than_noise(healthy):
         return bench
     told = "does not describe the healthy rig" if lacks else "leaves more than the healthy noise"
     progress(f"the model {told}: searching for a better base")
@@ -178,7 +202,9 @@ def with_adequate_base(bench: Bench, progress: Progress) -> Bench:
         better = _on_found_base(bench.study, ENOUGH if lacks else CLOSE, progress)
     except ModelError:
         return bench
-    return bench if better is None or _is_inadequate(better) else better
+    if better is None or _is_inadequate(better, _on_healthy(better)):
+        return bench
+    return better
 
 
 def _on_found_base(study: Study, enough: float, progress: Progress) -> Bench | None:
@@ -220,18 +246,16 @@ def _may_search(bench: Bench) -> bool:
     )
 
 
-def _leaves_more_than_noise(bench: Bench) -> bool:
+def _leaves_more_than_noise(healthy: _OnHealthy | None) -> bool:
     """Whether the healthy recording's error is above a noise that its repeated periods show."""
-    if (known := _on_healthy(bench)) is None:
-        return False
-    error, noise = known
-    return noise.method == "periods" and noise.ratio(error) > CLOSE
+    return healthy is not None and healthy.noise.method == "periods" and healthy.ratio > CLOSE
 
 
-def _is_inadequate(bench: Bench) -> bool:
+def _is_inadequate(bench: Bench, healthy: _OnHealthy | None) -> bool:
+    """Whether a fit did not converge, or leaves more of the healthy recording than is adequate."""
     bare, kept = bench.bare, bench.study.kept
     ended = {
         "the model to the healthy recording": bare.convergence if bare else None,
         "the kept parameters to the healthy recording": kept.convergence if kept else None,
     }
-    return (not_converged(ended) or inadequate(bench)) is not None
+    return not_converged(ended) is not None or (healthy is not None and not healthy.adequate)

@@ -19,9 +19,14 @@ from rigwatch.workbench.explain.verdict_calibration import (
 )
 from rigwatch.workbench.fit import Value, as_written, values
 from rigwatch.workbench.ranking import Ranked, vanishing_shape
+from rigwatch.workbench.study import FILE, Study, assumed_values
 
 STRENGTH_TOLD = ("missing_effect", "undetermined")
 """Verdicts of whose best effect the strength has its full uncertainty; fitting it takes time."""
+
+UNEXPLAINED = ("unknown_effect", "model_inadequate")
+"""Verdicts that values of another machine may cause."""
+ASSUMED = "{names}: taken from the model file; set this machine's under [start] in {file}"
 
 
 @dataclass(frozen=True)
@@ -97,20 +102,11 @@ class Explanation:
 
 def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanation:
     """Converts a ranking and a verdict to the result shown to users and programs."""
-    members, rivals = [*verdict.members, *verdict.rivals], list(verdict.rivals)
-    experiment = None
-    # Excitations are compared by simulating the motion; a model along the measured motion cannot.
-    # A rival of a set may have no row of its own among the single effects.
-    others = [row for row in rows if row.label in rivals]
-    if verdict.best is not None and others and not bench.data.along_motion:
-        experiment = propose(bench, verdict.best, others)
-    more: dict[str, float] = {}
+    members = [*verdict.members, *verdict.rivals]
+    more, told = _of_the_strength(bench, verdict)
+    told += _assumed(bench.study) if verdict.word in UNEXPLAINED else []
     compared = comparison(bench)
-    named = verdict.word in STRENGTH_TOLD
-    if named and verdict.best is not None and verdict.best.fitted is not None:
-        more = added_variances(bench.study, bench.data, bench.bare, verdict.best.fitted)
-        told = unweighed(bench, verdict.best.placement, verdict.best.fitted, more)
-        compared = replace(compared, remarks=[*compared.remarks, *told])
+    compared = replace(compared, remarks=[*compared.remarks, *told])
     listed = [
         _row(row, members, more) if row is verdict.best else _row(row, row.alike) for row in rows
     ]
@@ -122,9 +118,9 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         verdict.text,
         compared,
         listed,
-        rivals,
+        list(verdict.rivals),
         list(verdict.second),
-        experiment,
+        _experiment(bench, rows, verdict),
         None if unlike or (similar[0] and most is None) else probability,
         similar,
         list(verdict.beside),
@@ -133,6 +129,31 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         unlike=unlike,
         remains=_remains(bench, verdict),
     )
+
+
+def _experiment(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Experiment | None:
+    """An excitation that separates the rivals; None without rivals, or if none is found."""
+    # A rival of a set may have no row of its own among the single effects.
+    others = [row for row in rows if row.label in verdict.rivals]
+    # Excitations are compared by simulating the motion; a model along the measured motion cannot.
+    if verdict.best is None or not others or bench.data.along_motion:
+        return None
+    return propose(bench, verdict.best, others)
+
+
+def _of_the_strength(bench: Bench, verdict: Verdict) -> tuple[dict[str, float], list[str]]:
+    """Variances that what is taken for known adds to the best effect's parameters, and remarks."""
+    best = verdict.best if verdict.word in STRENGTH_TOLD else None
+    if best is None or best.fitted is None:
+        return {}, []
+    more = added_variances(bench.study, bench.data, bench.bare, best.fitted)
+    return more, list(unweighed(bench, best.placement, best.fitted, more))
+
+
+def _assumed(study: Study) -> list[str]:
+    """That values are the model file's, which may be of another machine."""
+    names = assumed_values(study.model, study.file)
+    return [ASSUMED.format(names=", ".join(names), file=study.folder / FILE)] if names else []
 
 
 def _unlike_training(bench: Bench, verdict: Verdict) -> list[str]:

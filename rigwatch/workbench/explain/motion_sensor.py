@@ -26,7 +26,7 @@ from rigwatch.workbench.explain.indistinguishable import EQUAL, NEARLY, lead
 from rigwatch.workbench.explain.verdict import Verdict, Word
 from rigwatch.workbench.explain.verdict_calibration import Evidence
 from rigwatch.workbench.fit import Fitted, fit_model
-from rigwatch.workbench.ranking import Ranked, denied_sensors, judge_fit
+from rigwatch.workbench.ranking import Ranked, denied_sensors, denies_gain, judge_fit
 
 STEPS = 2
 """Gauss-Newton steps; the error is nearly linear in the strength."""
@@ -36,15 +36,15 @@ most."""
 WORTH = 0.1
 """Smallest share of the error's energy above the floor, to first order, that justifies a fit."""
 
-LATE = "lag"
-"""The effect that can only be positive, since a sensor is causal."""
+LATE, GAIN = "lag", "gain"
+"""The effect that can only be positive, since a sensor is causal, and that of a wrong scale."""
 
 Motion = tuple[FloatArray, FloatArray]
 Direction = Callable[[FloatArray, FloatArray, FloatArray], Motion]
 """Changes of position and speed from position, speed and time, each of shape (n,)."""
 
 DIRECTIONS: Mapping[str, Direction] = {
-    "gain": lambda x, v, _: (x, v),
+    GAIN: lambda x, v, _: (x, v),
     "offset": lambda x, v, _: (np.ones_like(x), np.zeros_like(v)),
     "drift": lambda _, v, t: (t, np.ones_like(v)),
     "curvature": lambda x, v, _: (x * x, 2 * x * v),
@@ -75,8 +75,19 @@ def motion_sensor_rows(bench: Bench) -> list[Ranked]:
             row = _row(Placement(name, effect, sensor.port), explained, strength)
             row.fitted = fitted
             judge_fit(bench.base, row)
+            _deny_gain(bench.data, sensor, row)
             found.append(row)
     return found
+
+
+def _deny_gain(data: Data, sensor: MotionSensor, row: Ranked) -> None:
+    """Refuse a gain that the sensor of the motion's balance would have shown."""
+    if row.placement.name != GAIN or data.healthy is None:
+        return
+    gain = row.start[row.placement.effect.strength]
+    reason = denies_gain(data.healthy, data.train, sensor.rate, gain)
+    if reason:
+        row.accepted, row.reason = False, reason
 
 
 def _row(placement: Placement, explained: float, strength: float) -> Ranked:

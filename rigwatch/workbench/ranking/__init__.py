@@ -18,6 +18,7 @@ from rigwatch.workbench.ranking.candidates import candidates, shapes_of, suitabl
 from rigwatch.workbench.ranking.fit_selection import select_for_fit
 from rigwatch.workbench.ranking.nested_start import refit_nested
 from rigwatch.workbench.ranking.paired_test import difference
+from rigwatch.workbench.ranking.proportion import denies_gain
 from rigwatch.workbench.ranking.rank import AGAIN, MUCH_WORSE, rank
 from rigwatch.workbench.ranking.ranked import SAME, SIMILAR, Ranked, accepted_from, in_order
 from rigwatch.workbench.ranking.refinements import (
@@ -26,7 +27,9 @@ from rigwatch.workbench.ranking.refinements import (
     with_refinements,
 )
 from rigwatch.workbench.ranking.refitting import (
+    Fitting,
     Progress,
+    fit_started,
     no_progress,
     orders_at_port,
     own_floor,
@@ -44,12 +47,15 @@ __all__ = [
     "SAME",
     "SIMILAR",
     "STEP",
+    "Fitting",
     "Progress",
     "Ranked",
     "accepted_from",
     "candidates",
     "denied_sensors",
+    "denies_gain",
     "difference",
+    "fit_started",
     "in_order",
     "judge_fit",
     "left_over",

@@ -1,6 +1,6 @@
 """Fits the model with an effect in it, and judges the fit on the recordings held out."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -51,16 +51,25 @@ def refit(
     judge_fit(base, row)
 
 
-def fit_from(found: Fitted | None) -> Fitting:
-    """`fit_model` that starts from the model's parameters in another fit."""
-    own = found.train.values() if found else {}
+def fit_started(known: Callable[[Study, Sequence[Placement]], Mapping[str, float]]) -> Fitting:
+    """`fit_model` with other initial values.
+
+    Args:
+        known: the initial values that replace the given ones, for a study and its placements.
+    """
 
     def fitting(study: Study, *args: Any, **more: Any) -> Fitted:
         data, placements, start, scale = args
-        known = {name: own[name] for name in study.model.parameters if name in own}
-        return fit_model(study, data, placements, {**start, **known}, scale, **more)
+        begin = {**start, **known(study, placements)}
+        return fit_model(study, data, placements, begin, scale, **more)
 
     return fitting
+
+
+def fit_from(found: Fitted | None) -> Fitting:
+    """`fit_model` that starts from the model's parameters in another fit."""
+    own = found.train.values() if found else {}
+    return fit_started(lambda study, _: {n: own[n] for n in study.model.parameters if n in own})
 
 
 def orders_at_port(base: Fitted, row: Ranked) -> list[Placement]:

@@ -12,6 +12,7 @@ from rigwatch.workbench.study.edits import (
 )
 from rigwatch.workbench.study.elements import Element, elements_of, written_variants
 from rigwatch.workbench.study.folder import FILE, LEDGER, digest
+from rigwatch.workbench.study.known_values import assumed_values
 from rigwatch.workbench.study.ledger import append, check_data, commit, lines, model_hash, stands_on
 from rigwatch.workbench.study.moving_parameters import judged_alone
 from rigwatch.workbench.study.recording_parameters import Known
@@ -49,6 +50,7 @@ __all__ = [
     "StudyFile",
     "append",
     "append_effect",
+    "assumed_values",
     "check_data",
     "check_new",
     "commit",

@@ -61,6 +61,12 @@ def with_known_values(model: Model, file: StudyFile) -> Model:
     return structs.replace(model, parameters=model.parameters | given)
 
 
+def assumed_values(model: Model, file: StudyFile) -> list[str]:
+    """Names of the known parameters whose values are the model file's, not the study's."""
+    known = [n for n, p in model.parameters.items() if p.fixed and not (p.kept or p.per_recording)]
+    return [name for name in known if name not in file.start]
+
+
 def _as_given(name: str, p: Parameter, file: StudyFile) -> Parameter:
     """The parameter; a value without a deviation is exact."""
     own = 0.0 if name in file.start else p.deviation

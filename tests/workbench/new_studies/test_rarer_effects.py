@@ -11,6 +11,9 @@ from rigwatch.workbench.ranking import suitable
 from rigwatch.workbench.study import open_study
 from tests.workbench.studies.test_recordings_apart import DAMPER
 
+WITH_OIL = DAMPER.replace("c*v -", "thickness*c*v -").replace(
+    "outputs.", 'parameters.thickness = { value = 1.0, unit = "1", fixed = true }\noutputs.'
+)
 HINT = "rarer effects have not been tried"
 
 
@@ -30,7 +33,7 @@ def logged(path: Path, seed: int) -> str:
 def test_rarer_effects_are_counted_apart_and_offered_where_none_explains_the_error(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "damper.toml").write_text(DAMPER)
+    (tmp_path / "damper.toml").write_text(WITH_OIL)
     logs = [logged(tmp_path / f"run{seed}.csv", seed) for seed in (1, 2)]
     folder, model = tmp_path / "study", tmp_path / "damper.toml"
     assert main(["study", "new", f"{folder}", "--data", *logs, "--model", f"{model}"]) == 0
@@ -46,5 +49,7 @@ def test_rarer_effects_are_counted_apart_and_offered_where_none_explains_the_err
     assert "something is missing that no known effect explains" in out
     assert f"next: {len(rarer)} {HINT}" in out
     file = folder / "study.toml"
+    own_value = f"set this machine's under [start] in {file}"
+    assert f"note: thickness: taken from the model file; {own_value}" in out
     file.write_text(f"whole_library = true\n{file.read_text()}")
     assert suitable(open_study(folder))[1] == []

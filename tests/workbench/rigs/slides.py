@@ -57,7 +57,7 @@ def law(x: float, v: float, hidden: Hidden) -> float:
     return float(-hidden.cubic * (x - MIDDLE) ** 3 - rubbing * np.tanh(v / 1e-4))
 
 
-@kernel()
+@kernel(allocates=True)
 def _moved(u: np.ndarray, strength: float, steps: int, h: float, hidden: Hidden) -> np.ndarray:
     """Position and acceleration at each sample."""
     out = np.zeros((u.size, 2))

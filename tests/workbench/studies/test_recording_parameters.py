@@ -97,7 +97,7 @@ def test_what_is_known_is_shown_in_its_unit(tmp_path: Path, capsys) -> None:
     ("given", "said"),
     [
         ("inf", r"held_out\[0\].parameters.m: found inf, expected a finite number"),
-        ("'heavy'", r"parameters.m: found 'heavy', expected float"),
+        ("'heavy'", r"parameters.m: found 'heavy', expected a number"),
     ],
 )
 def test_a_value_that_is_no_number_is_refused(tmp_path: Path, given: str, said: str) -> None:

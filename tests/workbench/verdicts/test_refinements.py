@@ -36,7 +36,7 @@ RATE, STEPS = 256.0, 40
 CENTRE, REACH = 0.004, 2e-4
 
 
-@kernel()
+@kernel(allocates=True)
 def slid(u: np.ndarray, binding: float, steps: int, h: float) -> np.ndarray:
     """Position and acceleration at each sample; the force of the contact is bent over `REACH`."""
     out = np.zeros((u.size, 2))

@@ -55,7 +55,7 @@ call: Any = intrinsic(_call)
 """call(address, t, a, u, p, out, slopes): arrays are passed by their address."""
 
 
-@part(error_model="numpy")
+@part(allocates=True, error_model="numpy")
 def input_rows(u: FloatArray, count: int) -> FloatArray:
     """Rows for inputs, the time until held ones change, and the fastest rate of a memory."""
     rows = np.empty((count, u.shape[1] + 2))
@@ -212,7 +212,7 @@ def needed(  # noqa: PLR0917 -- a kernel
     return worst * dt
 
 
-@kernel(error_model="numpy", nogil=True)
+@kernel(allocates=True, error_model="numpy", nogil=True)
 def simulate(  # noqa: PLR0917 -- a kernel
     step: int, read: int, plain: int, pace: int, update: int, updated: bool, asked: int,
     crossing: IntArray, m: int, rows: int, u: FloatArray, dt: float, substeps: int, finest: int,
@@ -260,7 +260,7 @@ def simulate(  # noqa: PLR0917 -- a kernel
             last[w, i] = z[i]
 
 
-@kernel(error_model="numpy", nogil=True)
+@kernel(allocates=True, error_model="numpy", nogil=True)
 def linearise(  # noqa: C901, PLR0912, PLR0917 -- a kernel
     plain_step: int, read_slopes: int, rate_slopes: int, update_slopes: int, u: FloatArray,
     dt: float,

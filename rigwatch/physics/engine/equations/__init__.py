@@ -22,6 +22,7 @@ from rigwatch.physics.engine.equations.measured_motion import (
     has_hidden_states,
     measured_states,
     predicted_outputs,
+    unmoved_at_rest,
 )
 from rigwatch.physics.engine.equations.model import (
     Hold,
@@ -119,6 +120,7 @@ __all__ = [
     "spelt_out",
     "symbol",
     "units_at",
+    "unmoved_at_rest",
     "unused_ports",
     "with_variants",
 ]

@@ -109,6 +109,26 @@ def along_measured_motion(model: Model) -> Model:
     )
 
 
+def unmoved_at_rest(model: Model) -> Model:
+    """The model, not transformed, with balances that are zero while their motion is exactly zero.
+
+    Whatever holds a body that sticks balances what pushes it, so that its speed does not change.
+    Along a measured motion an equation of sliding friction does not know that: it leaves an
+    acceleration that is not there, and hidden states that follow it, as the mean that an AC-coupled
+    sensor takes away, are wrong for long after the body moves again.
+
+    Args:
+        model: only balances that are a quantity of their own are found.
+    """
+    quantities = dict(model.quantities)
+    for state in balanced_states(model):
+        own = quantities.get(model.states[state.name].derivative)
+        if own is not None and state.order == 1:
+            held = f"abs(sign({state.name}))*({own.expression})"
+            quantities[model.states[state.name].derivative] = replace(own, expression=held)
+    return replace(model, quantities=quantities)
+
+
 def _outputs(model: Model) -> dict[str, Output]:
     """The predicted outputs: those that remain or, if none does, the balances."""
     kept = predicted_outputs(model)

@@ -136,7 +136,7 @@ def _propagated(
     return np.moveaxis(moved, 0, -1)
 
 
-@kernel(nogil=True)
+@kernel(allocates=True, nogil=True)
 def _propagate(  # noqa: C901, PLR0917 -- a kernel
     rates: FloatArray, reads: FloatArray, updates: FloatArray, free: int, columns: IntArray,
     held: BoolArray, pushes: FloatArray, h: float, substeps: int, moved: FloatArray,

@@ -5,6 +5,7 @@ Without keys the secret of the account signs, and the user's name is not proved.
 
 import contextlib
 import hashlib
+import threading
 from dataclasses import dataclass, fields, replace
 from typing import TypeVar
 
@@ -42,11 +43,12 @@ class CommandCheck:
         security: section [bus.security].
 
     Attributes:
-        refused: number of commands refused.
+        refused: number of commands refused, those included that could not be read.
     """
 
     def __init__(self, bus: Bus, security: SecuritySection) -> None:
         self.refused = 0
+        self._counting = threading.Lock()
         self._verifier = verifier_of(security, bus.rig)
         run = self._verifier.run.encode()
         bus.serve(RUN_KEY, lambda _: [run])
@@ -56,9 +58,14 @@ class CommandCheck:
         try:
             self._verifier.check(command.user, command.proof, _said(command))
         except KeysError as error:
-            self.refused += 1
+            self.refuse()
             return Verdict(NOT_PROVED, str(error))
         return Verdict(PROVED if self._verifier.proves_user else NOT_PROVED)
+
+    def refuse(self) -> None:
+        """Count a refusal; commands come in several threads."""
+        with self._counting:
+            self.refused += 1
 
 
 def signed(bus: Bus, command: Command) -> Command:

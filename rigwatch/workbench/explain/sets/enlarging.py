@@ -1,9 +1,8 @@
 """Sets with another effect: scored, tried on a part of long recordings, fitted to the whole."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 from weakref import WeakKeyDictionary
 
 from rigwatch.physics.engine.compile import side_by_side
@@ -17,8 +16,15 @@ from rigwatch.workbench.explain.sets.combination import (
 )
 from rigwatch.workbench.explain.sets.training_part import Trial, part_of, tried
 from rigwatch.workbench.fit import Fitted, fit_model
-from rigwatch.workbench.ranking import MATERIAL, Ranked, candidates, refit, scored
-from rigwatch.workbench.study import Study
+from rigwatch.workbench.ranking import (
+    MATERIAL,
+    Fitting,
+    Ranked,
+    candidates,
+    fit_started,
+    refit,
+    scored,
+)
 
 _SCORED: WeakKeyDictionary[Fitted, list[Ranked]] = WeakKeyDictionary()
 """Scores of all effects by the fit they were scored along; sets share the fits of their parts."""
@@ -97,13 +103,9 @@ def all_fitted(bench: Bench, larger: Sequence[Larger]) -> list[Combination]:
 
 def _enlarged(bench: Bench, larger: Larger) -> Combination | None:
     """A set with another effect; None if it cannot be fitted."""
-    known, row, starts = larger.known, larger.row, larger.trial and larger.trial.starts
-
-    def fitting(study: Study, *args: Any, **more: Any) -> Fitted:
-        data, placements, start, scale = args
-        start = (starts or {}).get(placements[-1].ahead, start)
-        return fit_model(study, data, placements, start, scale, **more)
-
+    known, row = larger.known, larger.row
+    starts = larger.trial.starts if larger.trial else {}
+    fitting = fit_started(lambda _, placements: starts.get(placements[-1].ahead, {}))
     fit_with(bench, known.rows, known.fitted, row, fitting)
     return None if row.fitted is None else combination_of(bench, (*known.rows, row))
 
@@ -126,7 +128,7 @@ def fit_with(
     rows: Sequence[Ranked],
     fitted: Fitted,
     row: Ranked,
-    fitting: Callable[..., Fitted] = fit_model,
+    fitting: Fitting = fit_model,
 ) -> None:
     """Fit an effect with others in the model, starting from their fit."""
     refit(with_rows(bench.study, rows), bench.data, fitted, row, fitting)

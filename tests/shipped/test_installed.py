@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.tooling.test_wheel import LINE, STUDY, built
+from tests.shipped.test_wheel import LINE, STUDY, built
 
 __all__ = ["built"]
 
