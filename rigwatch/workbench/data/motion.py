@@ -41,6 +41,10 @@ STUCK = 5
 """Samples over which a rig that is not moving moves less than at that speed in one of them."""
 BESIDE = 9
 """Samples about a rest that do not count: smoothing spreads the instant in which a rig stops."""
+STICKS = 0.05
+"""Share of rests from which a rig sticks: its friction then bends the speed where it reverses so
+much that smoothing shows the reversal a sample late, and the sample before does not count either.
+"""
 UNCHECKED = (
     "no healthy recording: the model cannot be checked; record one with nothing wrong and list it"
     " under [[healthy]]"
@@ -165,8 +169,10 @@ def _while_moving(study: Study, recording: Recording, slow: FloatArray) -> Recor
         return recording
     speeds = recording.inputs[:, rates]
     still = np.any(np.abs(speeds) < slow[rates], axis=1)
-    still |= maximum_filter1d(np.any(speeds == 0.0, axis=1), BESIDE)
-    still[1:] |= np.any(speeds[1:] * (2.0 * speeds[1:] - speeds[:-1]) < 0.0, axis=1)
+    rests = np.any(speeds == 0.0, axis=1)
+    still |= maximum_filter1d(rests, BESIDE)
+    if rests.mean() > STICKS:
+        still[1:] |= np.any(speeds[1:] * (2.0 * speeds[1:] - speeds[:-1]) < 0.0, axis=1)
     return replace(recording, outputs=np.where(still[:, None], np.nan, recording.outputs))
 
 
