@@ -87,6 +87,7 @@ def test_29_a_second_source(rig: BusRig) -> None:
     assert alarm.severity == "critical", "after a single sample"
     rig.goes_on()
     rig.each_is_judged_once(first)
+    ring.close()  # without keys, a monitor that starts would take its answers for the source's
 
 
 def test_30_payloads_that_are_no_messages(rig: BusRig) -> None:
@@ -163,18 +164,18 @@ def test_27_a_partition(rig: BusRig, seconds: float) -> None:
     """
 
     def partition() -> float:
-        first, began = rig.newest(), time.time_ns()
+        first, since, began = rig.newest(), len(rig.gaps), time.time_ns()
         with stopped(rig.proxy):
             took = rig.noticed("stale", began)
             time.sleep(seconds)
         rig.goes_on(300)
         rig.each_is_judged_once(first)
+        assert [g for g in rig.gaps[since:] if (g.reporter, g.boot) == ("monitor", BOOT)] == []
         return took
 
     if rig.restless("stale"):
         rig.renew()
     least_of(partition, 0.1, rig.renew)
-    assert [g for g in rig.gaps if g.reporter == "monitor"] == []
 
 
 def test_28_a_late_joiner(rig: BusRig) -> None:
