@@ -139,7 +139,7 @@ def test_what_a_rig_recorded_long_ago_is_thinned_while_it_goes_on(
     days.passes()
     first, second = sessions(config)
     archive = str(first.parent)
-    for words in (["index", archive], ["retain", archive, "--keep-days", "1e-6", "--keep-seconds",
+    for words in (["index", archive], ["retain", archive, "--keep-days", "1e-9", "--keep-seconds",
                                        "--remove"]):  # fmt: skip
         assert main(["archive", *words]) == 0
     assert not first.exists()

@@ -259,7 +259,7 @@ def test_a_rate_that_no_device_has_is_refused_as_an_option_too(
     words = [str(table), str(tmp_path / "a.mcap"), "--map", "position=x[m]", "--rate", "1e-300"]
     assert main(["import", *words]) == 2
     told = capsys.readouterr().err
-    assert told == "rigwatch: options of import: rate: found 1e-300, expected float >= 1e-06\n"
+    assert told == "rigwatch: options of import: rate: found 1e-300, expected a number >= 1e-06\n"
 
 
 def test_output_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from rigwatch.wire.errors import ConfigError, RigwatchError
 
-_TOML = re.compile(r"\(at line (\d+), column (\d+)\)")
+_COLUMN = re.compile(r" at column (\d+)\)")
+"""Where a line is no TOML."""
 _OWNER = re.compile(r"\b(effect|state|output|port|quantity|parameter|input) (\w+)\b")
 _KEY = re.compile(r"\b((?:effects|inputs|states|outputs|ports|quantities|parameters)\.[\w.]+)")
 _FOUND = re.compile(r"found (?:the unknown name )?'((?:[^'\\]|\\.)+)'")
@@ -42,12 +43,11 @@ def problem(error: RigwatchError, text: str, name: str) -> Problem:
         name: of the file; left out of the problem's text.
     """
     told = str(error).removeprefix(f"{name}: ")
-    if found := _TOML.search(told):
-        return Problem(int(found[1]), int(found[2]), 1, told)
     if isinstance(error, ConfigError) and error.line:
-        key = error.key.rpartition(".")[2]
-        told = f"{error.key}: found {error.found}, expected {error.expected}"
-        return _at_key(text, error.line, key, told)
+        found = f"found {error.found}, expected {error.expected}"
+        if not error.key:
+            return _at_column(error.line, found)
+        return _at_key(text, error.line, error.key.rpartition(".")[2], f"{error.key}: {found}")
     lines = list(_section(text, _owner(told)))
     return _snippet(lines, told) or Problem(lines[0][0] if lines else 0, 0, 0, told)
 
@@ -56,6 +56,11 @@ def remark(text: str, key: str, told: str, *, severe: bool) -> Problem:
     """A remark about a table, such as "parameters.M"."""
     lines = list(_section(text, key))
     return Problem(lines[0][0] if lines else 0, 0, 0, f"{key}: {told}", severe)
+
+
+def _at_column(line: int, told: str) -> Problem:
+    column = _COLUMN.search(told)
+    return Problem(line, int(column[1]), 1, told) if column else Problem(line, 0, 0, told)
 
 
 def _at_key(text: str, line: int, key: str, told: str) -> Problem:
