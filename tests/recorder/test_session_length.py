@@ -17,6 +17,8 @@ from rigwatch.wire.session import open_session, run_info
 from tests.recorder.test_recorder import CONFIG, Source, alarm, recorded
 from tests.waiting import eventually
 
+SECOND_NS = 10**9
+
 
 @pytest.fixture
 def config(tmp_path: Path) -> Path:
@@ -138,6 +140,8 @@ def test_what_a_rig_recorded_long_ago_is_thinned_while_it_goes_on(
     days.ends()
     days.passes()
     first, second = sessions(config)
+    ended = max(int(block.t_ns[-1]) for block in open_session(first).samples())
+    eventually(lambda: time.time_ns() > ended + SECOND_NS, "the first session is in the past")
     archive = str(first.parent)
     for words in (["index", archive], ["retain", archive, "--keep-days", "1e-9", "--keep-seconds",
                                        "--remove"]):  # fmt: skip
