@@ -77,15 +77,16 @@ def _slides(kept: DecisionState, ago: int) -> bool:
 
 
 @part()
-def _goes_on(kept: DecisionState, ago: int) -> bool:
-    """Whether the speed, going on as it does, keeps its direction to the next sample.
+def _slides_on(kept: DecisionState, ago: int) -> bool:
+    """Whether it slides and the speed, going on as it does, keeps its direction to the next sample.
 
     Strong friction bends the speed where it reverses, and smoothing delays the reversal of a bent
     speed, so that the force has changed sign in the sample before.
     """
     head = kept.counts[HEAD]
     speed = kept.rows[(head - ago) % HISTORY, SPEED]
-    return bool(speed * (2.0 * speed - kept.rows[(head - ago - 1) % HISTORY, SPEED]) > 0.0)
+    following = 2.0 * speed - kept.rows[(head - ago - 1) % HISTORY, SPEED]
+    return bool(speed * following > 0.0) and _slides(kept, ago)
 
 
 @part()
@@ -101,7 +102,7 @@ def friction(
     used = 0
     a = b = c = p = q = yy = 0.0
     for ago in range(1, n + 1):
-        if not (_slides(kept, ago) and _goes_on(kept, ago)):
+        if not _slides_on(kept, ago):
             continue
         row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
         used += 1
@@ -172,7 +173,7 @@ def _force_since(kept: DecisionState, start: int, high_pass: FloatArray) -> floa
     for ago in range(start, 0, -1):
         row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
         unit = filter_sample(high_pass[0], high_pass[1], state, row[BARE])
-        if _slides(kept, ago) and _goes_on(kept, ago):
+        if _slides_on(kept, ago):
             a += unit * unit
             p += unit * row[ERROR]
     return p / a if a > 0.0 else 0.0
@@ -188,7 +189,7 @@ def drive_explains(kept: DecisionState, length: int, spread: float) -> float:
     used = 0
     a = p = yy = 0.0
     for ago in range(1, n + 1):
-        if not (_slides(kept, ago) and _goes_on(kept, ago)):
+        if not _slides_on(kept, ago):
             continue
         row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
         used += 1

@@ -29,8 +29,6 @@ from rigwatch.wire.session import SUFFIX, Session, open_session
 
 LONGEST_BREAK = 120.0
 """Interruption after which a recorder starts a new session [s]."""
-
-
 _SECOND_NS = 1_000_000_000
 _FORMAT = "%Y%m%dT%H%M%SZ"
 _STAMP = re.compile(r"\d{8}T\d{6}Z(-\d+)?")

@@ -27,7 +27,6 @@ from rigwatch.wire.messages.packed import (
     layout_of,
 )
 
-_I8 = np.dtype("<i8")
 T = TypeVar("T", bound=np.generic)
 Numbers = tuple[IntArray, FloatArray, ByteArray]
 """Times, values and quality, each with the samples in the last axis."""
@@ -147,7 +146,7 @@ def _gathered(layout: Layout, parts: Sequence[_Part]) -> Numbers:
     """Times, values and quality of payloads of one layout; the first axis is the payload."""
     raw, times = b"".join([part.data for part in parts]), len(layout.times)
     # The eight bytes from each byte on; an index takes those that are a number.
-    eights: IntArray = np.ndarray((len(raw) - 7,), _I8, raw, strides=(1,))
+    eights: IntArray = np.ndarray((len(raw) - 7,), np.int64, raw, strides=(1,))
     words = _taken(eights, layout.words, len(raw), len(parts))
     flags = _taken(np.frombuffer(raw, np.uint8), layout.flags, len(raw), len(parts))
     return words[:, :times], words[:, times:].view(np.float64), flags
@@ -157,6 +156,7 @@ def _taken(raw: NDArray[T], places: NDArray[np.intp], size: int, parts: int) -> 
     """What is at these places of each of the parts of equal size; the first axis is the part."""
     if not places.size:
         return np.empty((parts, *places.shape), raw.dtype)
-    starts = np.arange(0, size, size // parts)[:, None, None]
-    found: NDArray[T] = raw[places][None] if parts == 1 else raw[starts + places]
-    return found
+    if parts > 1:
+        places = np.arange(0, size, size // parts)[:, None, None] + places
+    found: NDArray[T] = raw[places]
+    return found.reshape(parts, *found.shape[-2:])
