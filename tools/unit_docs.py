@@ -17,8 +17,8 @@ or, where that has none but SI, in that of the log (`shown = { speed = "rpm" }` 
 and the ledger have them in SI, with the unit named.
 
 * Products by a space, `*` or `·`; quotients by `/`, which applies to the next factor only: `N s/m`,
-  `m/(s V)`, `kN/mm`. Powers by `^`, also broken ones: `m/s^2`, `l/(min bar^0.5)`; `m/s2` and `m/s²`
-  are read, too. In equations a power is `**`.
+  `m/(s V)`, `kN/mm`. Powers by `^`, also broken ones: `m/s^2`, `l/(min bar^0.5)`, `V^(1/2)`;
+  `m/s2` and `m/s²` are read, too. In equations a power is `**`.
 * `g` is the gram; standard gravity is `g0` or `gn`. Accelerometers are often labelled g, so an
   import refuses `g` and suggests `g0` or `gram`.
 * A temperature that stands alone is absolute: 20 degC are 293.15 K. Within a product it is a

@@ -94,7 +94,9 @@ parameters.gap = { unit = "mm", value = 0.5, low = 0.1, high = 2.0, tried = [0.2
         ("(mm/s)^2", 1e-6, "(m/s)^2", "m^2 s^-2"),
         ("m/s2", 1.0, "m/s^2", "m s^-2"),
         ("mm³", 1e-9, "m^3", "m^3"),
-        ("l/(min bar^0.5)", 1e-3 / 60 / math.sqrt(1e5), "m^3/(s Pa^0.5)", "kg^-1/2 m^7/2"),
+        ("l/(min bar^0.5)", 1e-3 / 60 / math.sqrt(1e5), "m^3/(s Pa^0.5)", "kg^(-1/2) m^(7/2)"),
+        ("mm^(5/2)/s", 1e-3**2.5, "m^2.5/s", "m^(5/2) s^-1"),
+        ("(mm)^(-1/2)", 1e-3**-0.5, "(m)^-0.5", "m^(-1/2)"),
     ],
 )
 def test_a_unit_has_its_factor_and_its_dimension(
@@ -103,6 +105,7 @@ def test_a_unit_has_its_factor_and_its_dimension(
     found = unit_of(text)
     assert float(found.factor) == pytest.approx(factor, rel=1e-15)
     assert (found.si, describe(found.dimension)) == (si, dimension)
+    assert unit_of(dimension).dimension == found.dimension
     assert unit_of(found.si).plain
 
 

@@ -8,7 +8,7 @@ from rigwatch.commands.common import print_result, say
 HELP = "add an effect to the model of a study and refit; refused unless the held-out error falls"
 EXAMPLE = """\
   rigwatch add emps coulomb
-  rigwatch add emps offset --port force_sensor
+  rigwatch add emps offset@force_sensor
   rigwatch add motor viscous_by_direction --with saturation@drive coulomb@shaft
   rigwatch add emps --effect-file my_effects.toml"""
 
@@ -16,7 +16,9 @@ EXAMPLE = """\
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("study", type=Path, help="the study's folder")
-    parser.add_argument("effect", nargs="?", help="name of the effect")
+    parser.add_argument(
+        "effect", nargs="?", metavar="EFFECT[@PORT]", help="the effect, as the ranking names it"
+    )
     parser.add_argument("--port", help="port where it acts, if several are possible")
     parser.add_argument(
         "--anyway", action="store_true", help="add it even though the held-out error does not fall"
@@ -54,9 +56,23 @@ def run(arguments: argparse.Namespace) -> int:
             return 0
     if arguments.effect is None:
         raise ModelError("add: found no effect, expected its name, or --effect-file")
+    effect, port = _placed(arguments.effect, arguments.port)
     change = add(
-        study, arguments.effect, arguments.port, anyway=arguments.anyway,
-        beside=arguments.beside, progress=say,
-    )  # fmt: skip
+        study, effect, port, anyway=arguments.anyway, beside=arguments.beside, progress=say
+    )
     print_result(arguments, change, change_lines(change))
     return 1 if change.step == "refused" else 0
+
+
+def _placed(effect: str, port: str | None) -> tuple[str, str | None]:
+    """Name of the effect and of its port, None if neither `effect@port` nor `--port` gives one.
+
+    Raises:
+        ModelError: they give two ports.
+    """
+    from rigwatch.wire.errors import ModelError
+
+    name, _, named = effect.partition("@")
+    if named and port and named != port:
+        raise ModelError(f"add: found {effect} with --port {port}, expected one port")
+    return name, named or port

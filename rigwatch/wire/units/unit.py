@@ -1,9 +1,9 @@
 """Units in common notation: their dimension, and conversion of values to SI.
 
 "N s/m", "kN/mm", "m/s^2", "N/(m/s)" and "l/min" are units: products by a space, * or ·, quotients
-by /, which applies to the next factor only, powers by ^. All files are converted on reading with
-the same table; internally all numbers are SI. A temperature by itself is absolute (degC has an
-offset); within a product it is a difference.
+by /, which applies to the next factor only, powers by ^, such as m^2 or V^(1/2). All files are
+converted on reading with the same table; internally all numbers are SI. A temperature by itself is
+absolute (degC has an offset); within a product it is a difference.
 """
 
 import difflib
@@ -20,7 +20,8 @@ from rigwatch.wire.units.unit_table import BASES, ENTRIES, IN_OTHER_WORDS, Dimen
 NONE: Dimension = (Fraction(0),) * len(BASES)
 """Of a pure number."""
 GRAM = "the unit g is the gram, write g0 for standard gravity"
-_EXPONENT = r"(?:(?:\^|\*\*)(?P<{0}>-?\d+(?:\.\d+)?))?"
+_POWER = r"-?\d+(?:\.\d+)?|\(-?\d+(?:\.\d+|/[1-9]\d?)?\)"
+_EXPONENT = rf"(?:(?:\^|\*\*)(?P<{{0}}>{_POWER}))?"
 _TOKEN = re.compile(
     rf"\s*(?:(?P<name>°?[A-Za-zµΩ%]+\d*|°|1){_EXPONENT.format('power')}"
     rf"|(?P<close>\)){_EXPONENT.format('closed')}|(?P<sign>[*/(]))\s*"
@@ -133,14 +134,19 @@ def _token(match: re.Match[str], text: str) -> _Token:
     name, power = match["name"], match["power"]
     if name is None:
         sign = ")" if match["close"] else match["sign"]
-        return _Token(sign, None, Fraction(match["closed"] or 1))
+        return _Token(sign, None, _exponent(match["closed"]))
     if name not in ENTRIES and power is None:
         # "m/s2" is how many programs write a power.
         letters = name.rstrip("0123456789")
         name, power = letters, name[len(letters) :] or None
     if name not in ENTRIES:
         raise _unknown(name, text)
-    return _Token(name, ENTRIES[name], Fraction(power or 1))
+    return _Token(name, ENTRIES[name], _exponent(power))
+
+
+def _exponent(text: str | None) -> Fraction:
+    """An exponent such as "2", "0.5" or "(1/2)"; 1 without one."""
+    return Fraction((text or "1").strip("()"))
 
 
 def _si_text(tokens: Sequence[_Token]) -> str:
@@ -212,11 +218,15 @@ def times(one: Dimension, other: Dimension, power: Fraction | int = 1) -> Dimens
 def describe(dim: Dimension) -> str:
     """The dimension in base units, such as "kg m s^-2"; "1" for a pure number."""
     parts = [
-        base if exponent == 1 else f"{base}^{exponent}"
+        base if exponent == 1 else f"{base}^{_written(exponent)}"
         for base, exponent in zip(BASES, dim, strict=True)
         if exponent
     ]
     return " ".join(parts) or "1"
+
+
+def _written(exponent: Fraction) -> str:
+    return f"{exponent}" if exponent.denominator == 1 else f"({exponent})"
 
 
 def names_gram(text: str) -> bool:

@@ -12,8 +12,13 @@ is fitted once over a horizon derived from the outputs.
 A drive that steps once a minute meets windows of a minute always at the same place. If that is a
 window's beginning or end, the window's own initial state takes up all that a lag does after a step.
 The horizon is then shortened until the steps fall inside the windows.
+
+A state that no channel shows is free at the beginning of each window. Over windows shorter than its
+time constant it takes up what the model lacks, so that many parameters fit alike and no two starts
+agree. Longer windows, of which fewer remain, are then tried.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +26,7 @@ from msgspec import structs
 
 from rigwatch.physics.engine.fit import Recording, filled
 from rigwatch.physics.engine.score import autocorrelation, first_below
+from rigwatch.physics.engine.search import hidden_states
 from rigwatch.wire.arrays import BoolArray, ComplexArray, FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, predicts_along_motion, prepare, quiet_scale
@@ -36,6 +42,12 @@ MOST_PERIODS = 12.0
 WINDOWS, FEWEST_WINDOWS = 10, 4
 """Minimum number of windows in the shortest recording, and if they would not span two periods."""
 LIMITED = ", limited to a tenth of the shortest recording"
+LENGTHENED = (
+    ", at most {share} of the shortest recording: over a tenth the fit does not converge, as"
+    " initial values of {states} stand in for what the model lacks"
+)
+FEWER_WINDOWS = {FEWEST_WINDOWS: "a quarter", 2: "half"}
+"""Windows of the shortest recording that are tried where a fit over more does not converge."""
 TWO_PERIODS = ", limited to two periods as the shortest recording holds few"
 FEWEST = 20
 """Minimum number of samples in a window."""
@@ -60,9 +72,7 @@ def with_horizon(study: Study) -> Study:
     if given or study.model.rough or predicts_along_motion(study):
         return study
     data = prepare(_with_source(study, ""))
-    shortest = (
-        min(length for r in (data.train, data.held_out) for length in r.parts) * data.train.dt
-    )
+    shortest = _shortest(data)
     longest, least = shortest / WINDOWS, FEWEST * data.train.dt
     begin = float(np.clip(_from_correlation(data.train), least, max(longest, least)))
     begin, shortened = _within_windows(begin, data)
@@ -83,12 +93,34 @@ def with_horizon(study: Study) -> Study:
     return _with_source(study, f"{name}{bound}{shortened}", chosen)
 
 
+def with_longer_horizons(study: Study, fitted: Fitted, data: Data) -> Iterator[Study]:
+    """The study with longer horizons if those that were chosen leave its fit without an optimum.
+
+    Args:
+        study: with its horizon chosen from the data.
+        fitted: its model, fitted over this horizon.
+        data: the recordings of the fit.
+    """
+    ended, hidden = fitted.convergence, hidden_states(fitted.compiled.system)
+    if ended is None or ended.converged or not hidden or LIMITED not in study.horizon_from:
+        return
+    source = study.horizon_from.partition(LIMITED)[0]
+    for count, share in FEWER_WINDOWS.items():
+        told = source + LENGTHENED.format(share=share, states=", ".join(hidden))
+        yield _with_source(study, told, _shortest(data) / count)
+
+
 def with_horizon_of(study: Study, other: Study) -> Study:
     """The study with the horizon chosen for another instance of it."""
     if not other.horizon_from:
         return study
     file = structs.replace(study.file, horizon=other.file.horizon)
     return replace(study, file=file, horizon_from=other.horizon_from)
+
+
+def _shortest(data: Data) -> float:
+    """Length of the shortest recording [s]."""
+    return min(length for r in (data.train, data.held_out) for length in r.parts) * data.train.dt
 
 
 def _within_windows(horizon: float, data: Data, needed: float = 0.0) -> tuple[float, str]:

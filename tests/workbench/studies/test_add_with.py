@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigwatch.commands import main
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.steps.change import add
 from rigwatch.workbench.steps.ledger_replay import replay
@@ -75,3 +76,12 @@ def test_with_the_set_it_is_added_and_the_ledger_has_the_evidence(motor: Path) -
     assert line["set"]["held_out_error"] < 0.1 * line["set"]["without_held_out_error"]
     assert line["held_out_error"] > 10 * line["set"]["held_out_error"]
     assert all(check.same for check in replay(changed))
+
+
+def test_an_effect_is_added_at_a_port_as_the_ranking_writes_it(
+    motor: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["add", str(motor), "curvature@speed_sensor", "--port", "drive"]) == 2
+    assert "found curvature@speed_sensor with --port drive" in capsys.readouterr().err
+    main(["add", str(motor), "curvature@speed_sensor"])
+    assert capsys.readouterr().out.startswith("curvature@speed_sensor: ")

@@ -4,7 +4,11 @@ search (ShortHorizons, WholeRuns) ──attempts──▶ multi_start_fit ──
 """
 
 from rigwatch.physics.engine.search.convergence import Convergence, convergence
-from rigwatch.physics.engine.search.hidden_states import continued_spread, has_hidden_states
+from rigwatch.physics.engine.search.hidden_states import (
+    continued_spread,
+    has_hidden_states,
+    hidden_states,
+)
 from rigwatch.physics.engine.search.multi_start_fit import multi_start_fit
 from rigwatch.physics.engine.search.promised_step import kept_promise
 from rigwatch.physics.engine.search.short_horizons import ShortHorizons
@@ -17,6 +21,7 @@ __all__ = [
     "continued_spread",
     "convergence",
     "has_hidden_states",
+    "hidden_states",
     "kept_promise",
     "multi_start_fit",
 ]
