@@ -21,7 +21,7 @@ from monitor.observer.prediction import (
     speed_state,
 )
 from monitor.signals import Codes
-from rigwatch.physics.engine.equations import Model, balanced_states, measured_states
+from rigwatch.physics.engine.equations import Model, balanced_states, measured_states, sensor_states
 from rigwatch.wire.arrays import BoolArray, FloatArray
 
 
@@ -38,6 +38,8 @@ class Layout:
         motions: indices among them of the motion.
         rates: indices among them of rates of change.
         signals: their names.
+        sensed: indices among the remainder's signals, motion and hidden states, of those states
+            that only a sensor keeps.
     """
 
     channels: tuple[str, ...]
@@ -47,6 +49,7 @@ class Layout:
     motions: tuple[int, ...]
     rates: tuple[int, ...]
     signals: tuple[str, ...]
+    sensed: tuple[int, ...]
 
     @property
     def balance(self) -> MotionColumn:
@@ -73,6 +76,8 @@ def layout_of(model: Model, port: str) -> Layout:
     columns.append(MotionColumn(len(channels) - 1, MATCHED if balance.order == 1 else 0))
     columns += [MotionColumn(place, STEPPED) for place in range(len(inputs))]
     names = [*model.inputs, *(state.name for state in motion)]
+    hidden = [name for name in model.states if name not in names]
+    kept, first = sensor_states(model), len(motion)
     return Layout(
         channels,
         tuple(columns),
@@ -81,6 +86,7 @@ def layout_of(model: Model, port: str) -> Layout:
         tuple(range(len(inputs), len(names))),
         tuple(rate_columns(model)),
         tuple(names),
+        tuple(first + k for k, name in enumerate(hidden) if name in kept),
     )
 
 

@@ -1,17 +1,19 @@
 """The equations' residual on healthy recordings, as a polynomial in motion and hidden states.
 
 The polynomial is smooth and fixed after fitting, so it cannot absorb a later fault. Ridge
-regression keeps terms small that the recordings do not determine.
+regression keeps terms small that the recordings do not determine. What a sensor keeps of its own
+signal, as the mean that one coupled by AC takes away, exerts no force: it may drift for minutes,
+beyond what any recording has seen, and no term contains it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 import scipy
 
 from monitor.model import RemainderSection
 from monitor.observer.missing_force import terms
-from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.arrays import BoolArray, FloatArray
 
 RIDGE = 3e-3
 """Ridge weight of the coefficients relative to the error, both in standard deviations."""
@@ -27,6 +29,7 @@ def fit_remainder(
     parts: Sequence[tuple[FloatArray, FloatArray]],
     filters: tuple[FloatArray, FloatArray],
     skip: int,
+    without: Collection[int],
 ) -> RemainderSection:
     """The remainder of healthy recordings.
 
@@ -34,17 +37,27 @@ def fit_remainder(
         parts: signals, shape (n, signals), and high-passed residual, shape (n,), of each recording.
         filters: of the high-pass.
         skip: number of samples skipped at the start of each.
+        without: indices of signals on which it does not depend.
     """
     every = np.concatenate([signals[skip:] for signals, _ in parts])
     centre, scale = every.mean(axis=0), np.maximum(every.std(axis=0), 1e-12)
+    used = _used(every.shape[1], without)
     columns = [
-        scipy.signal.lfilter(*filters, terms(z, centre, scale), axis=0)[skip:] for z, _ in parts
+        scipy.signal.lfilter(*filters, terms(z, centre, scale)[:, used], axis=0)[skip:]
+        for z, _ in parts
     ]
     phi, left = np.concatenate(columns), np.concatenate([e[skip:] for _, e in parts])
     size = np.maximum(phi.std(axis=0), 1e-12)
     phi = phi / size
     gram = phi.T @ phi + RIDGE * len(phi) * np.eye(phi.shape[1])
-    weights = np.linalg.solve(gram, phi.T @ left) / size
+    weights = np.zeros(used.size)
+    weights[used] = np.linalg.solve(gram, phi.T @ left) / size
     return RemainderSection(
         centre=tuple(centre.tolist()), scale=tuple(scale.tolist()), weights=tuple(weights.tolist())
     )
+
+
+def _used(signals: int, without: Collection[int]) -> BoolArray:
+    """Whether each term is one of the signals that count, shape (terms,)."""
+    counts = ~np.isin(np.arange(signals), list(without))
+    return np.concatenate([counts, np.outer(counts, counts)[np.triu_indices(signals)]])

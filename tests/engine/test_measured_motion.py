@@ -11,6 +11,7 @@ from rigwatch.physics.engine.equations.measured_motion import (
     along_measured_motion,
     has_hidden_states,
     predicted_outputs,
+    sensor_states,
     unmoved_at_rest,
 )
 from rigwatch.physics.engine.equations.model import (
@@ -278,3 +279,9 @@ def test_fit_along_the_motion_names_what_sits_on_a_bound() -> None:
     _, ended = _fitted_from_afar(t_high=0.75 * LATE)
 
     assert ended.at_bound == ("T",)
+
+
+def test_sensor_states_are_those_that_no_other_state_needs() -> None:
+    assert sensor_states(shipped_models()["servo-pneumatic"]) == {"mean"}
+    # The actuator's force moves the mass.
+    assert sensor_states(_actuated_mass()) == frozenset()

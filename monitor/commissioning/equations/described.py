@@ -3,6 +3,10 @@
 Equations may lack what only matters in fast motion, such as a valve of limited rate. They then
 leave a large part of the upper end of a sweep and little of slower recordings. The rig is judged
 below that frequency; faster motion is as unknown as motion of a size that was not recorded.
+
+Every recording tells how well its frequencies are described, by its power: what does not grow with
+the motion, as hysteresis of a valve, is a large part of a weak sweep and little of a strong drive
+at the same frequency.
 """
 
 from collections.abc import Sequence
@@ -89,10 +93,10 @@ def described(recordings: Sequence[Left], model: str, rate: float) -> Described:
     """
     shares = [one.share(one.held_out, one.pace.size) for one in recordings]
     bad = [one for one, share in zip(recordings, shares, strict=True) if not share <= WORST]
-    fastest = _fastest(bad, rate) if bad else 0.0
+    fastest = _fastest(recordings, rate) if bad else 0.0
     parts = tuple(_slower(one, fastest, rate) if bad else (0, one.pace.size) for one in recordings)
     kept = [(one, part) for one, part in zip(recordings, parts, strict=True) if part[1]]
-    left = max((one.share(one.held_out, part[1]) for one, part in kept), default=np.inf)
+    left = max((_left_of(one, part, rate) for one, part in kept), default=np.inf)
     if not left <= WORST or not any(one.role == "healthy" for one, _ in kept):
         worst = int(np.argmax(np.nan_to_num(shares, nan=np.inf)))
         raise ModelError(
@@ -104,14 +108,22 @@ def described(recordings: Sequence[Left], model: str, rate: float) -> Described:
     return Described(parts, fastest, left, rms(errors))
 
 
+def _left_of(one: Left, part: tuple[int, int], rate: float) -> float:
+    """Relative residual of what is kept: of its held-out samples or, without any, of all."""
+    begin = one.held_out if one.held_out < part[1] else max(part[0], round(STARTED * rate))
+    return one.share(begin, part[1])
+
+
 def _fastest(recordings: Sequence[Left], rate: float) -> float:
     """Upper end of the fastest band that is described [Hz]; 0 if there is none."""
-    paces, errors, sizes = (
-        np.concatenate(x) for x in zip(*_windows(recordings, rate), strict=True)
-    )
-    for top in np.sort(paces)[::-1]:
-        band = (paces <= top) & (paces >= top / BAND)
-        if errors[band].sum() <= DESCRIBED**2 * sizes[band].sum():
+    windows = _windows(recordings, rate)
+    for top in np.sort(np.concatenate([one[0] for one in windows]))[::-1]:
+        error = size = 0.0
+        for paces, errors, sizes in windows:
+            band = (paces <= top) & (paces >= top / BAND)
+            if band.any():
+                error, size = error + errors[band].mean(), size + sizes[band].mean()
+        if error <= DESCRIBED**2 * size:
             return float(top)
     return 0.0
 

@@ -50,7 +50,9 @@ def healthy_remainder(
     pairs = [(remainder_signals(o.rows, o.predicted.hidden, layout), o.judged[:, E]) for o in bare]
     del bare  # a recording's signals, of which six simulations, are a hundred columns
     earlier = [(z[: _split(z)], e[: _split(z)]) for z, e in pairs]
-    later = _observed(used, plant, fit_remainder(earlier, filters, skip), rate, jitters)
+    later = _observed(
+        used, plant, fit_remainder(earlier, filters, skip, layout.sensed), rate, jitters
+    )
     steady = [
         (one.name, o.judged) for one, o in zip(used, later, strict=True) if one.role == "healthy"
     ]
@@ -70,7 +72,7 @@ def healthy_remainder(
         for (z, e), (begin, end) in zip(pairs, found.parts, strict=True)
         if end > begin
     ]
-    remainder = fit_remainder(kept, filters, skip)
+    remainder = fit_remainder(kept, filters, skip, layout.sensed)
     every = _observed(used, plant, remainder, rate, jitters)
     cuts = [
         (o.part(begin, end), one.role)

@@ -23,6 +23,7 @@ from rigwatch.physics.engine.equations import (
     compose,
     names_in,
     names_reached,
+    sensor_states,
     spelt_out,
 )
 from rigwatch.wire.arrays import FloatArray
@@ -40,8 +41,7 @@ def sensor_parameters(model: Model) -> frozenset[str]:
     """Parameters used only in equations of states that no other state needs."""
     model = spelt_out(model)
     needed = [(name, _reached(model, state.derivative)) for name, state in model.states.items()]
-    sinks = {n for n, _ in needed if not any(n in used for other, used in needed if other != n)}
-    sinks -= {state.name for state in balanced_states(model)}
+    sinks = sensor_states(model)
     elsewhere = set().union(*(used for name, used in needed if name not in sinks))
     outputs = (_reached(model, output.expression) for output in model.outputs.values())
     elsewhere |= set().union(*outputs)

@@ -97,7 +97,7 @@ def _relative_energies(
         for o, z in zip(parts, signals, strict=True)
     ]
     others = [k for k in range(len(parts)) if k != place]
-    known = fit_remainder([(signals[k], bare[k]) for k in others], filters, skip)
+    known = fit_remainder([(signals[k], bare[k]) for k in others], filters, skip, layout.sensed)
     errors, grown = [], []
     for o, z, e in zip(parts, signals, bare, strict=True):
         left = (e - _described(known, z, filters))[skip:]

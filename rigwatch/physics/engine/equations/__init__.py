@@ -22,6 +22,7 @@ from rigwatch.physics.engine.equations.measured_motion import (
     has_hidden_states,
     measured_states,
     predicted_outputs,
+    sensor_states,
     unmoved_at_rest,
 )
 from rigwatch.physics.engine.equations.model import (
@@ -115,6 +116,7 @@ __all__ = [
     "parse_model",
     "predicted_outputs",
     "renamed",
+    "sensor_states",
     "shipped_models",
     "signal_order",
     "spelt_out",

@@ -74,6 +74,18 @@ def balanced_states(model: Model) -> tuple[MeasuredState, ...]:
     return tuple(s for s in measured if not _named(states[s.name].derivative) <= names)
 
 
+def sensor_states(model: Model) -> frozenset[str]:
+    """Hidden states that no other state needs: what a sensor keeps of a signal, as its mean."""
+    spelt = spelt_out(model)
+    needed = {n: names_reached(spelt, s.derivative, "model") for n, s in spelt.states.items()}
+    hidden = needed.keys() - {state.name for state in measured_states(model)}
+    return frozenset(
+        name
+        for name in hidden
+        if not any(name in used for other, used in needed.items() if other != name)
+    )
+
+
 def predicted_outputs(model: Model) -> tuple[str, ...]:
     """Outputs that are not simply a measured state, by name."""
     given = {state.name for state in measured_states(model)} | set(model.parameters)
