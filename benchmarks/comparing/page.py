@@ -50,7 +50,8 @@ runs from their first samples. The programs are in
 {done}
 
 *Physics known*: the user has written the missing terms, which is what the other tools are asked to
-find. *Lines*: of the program without imports and comments, or of model, study and commands.
+find. *Lines*: of the program without imports and comments, or of model, study and commands. Bold is
+the smallest error or the shortest time of a row, whosever it is.
 """
 TAIL = """
 Errors are of free runs, in which errors add up; rigwatch judges effects over horizons
@@ -60,31 +61,66 @@ it, CasADi all. Measured on {processor}, {cores} cores, Python {python}, {date},
 """
 
 
-def table(task: Task, found: Sequence[Cell]) -> list[str]:
-    """The rows of one data set."""
-    unit = task.shown[0]
+def table(found: Sequence[Cell], chosen: Sequence[Task]) -> list[str]:
+    """One table: three rows a data set, a column a user; the best of a row is bold."""
+    users = [user for user in NAMES if any(cell.user == user for cell in found)]
     lines = [
-        f"\n## {task.name}: {task.words}\n",
-        f"Missing in the linear model: {', '.join(task.effects)}. For comparison: {task.floor}.\n",
-        f"| user | held-out error [{unit}] | time [s] | lines | physics named |",
-        "| --- | --- | --- | --- | --- |",
+        f"| data set | | {' | '.join(NAMES[user] for user in users)} |",
+        f"| --- | --- |{' --- |' * len(users)}",
     ]
-    for cell in found:
-        error = f"{cell.error:.3g}" if cell.error < float("inf") else "-"
-        named, name = cell.named.replace("|", "\\|"), NAMES[cell.user]
-        lines.append(f"| {name} | {error} | {cell.seconds:.3g} | {cell.lines} | {named} |")
-    best = min(found, key=lambda cell: cell.error)
-    fastest = min(found, key=lambda cell: cell.seconds)
-    lines.append(f"\nSmallest error: {NAMES[best.user]}. Fastest: {NAMES[fastest.user]}.")
+    for task in chosen:
+        cells = {cell.user: cell for cell in found if cell.task == task.name}
+        own = [cells.get(user) for user in users]
+        errors = [cell.error if cell else float("inf") for cell in own]
+        times = [cell.seconds if cell and cell.error < float("inf") else None for cell in own]
+        missing = f"{task.name}; missing: {task.words}; {task.floor}"
+        lines += [
+            _row(missing, f"held-out error [{task.shown[0]}]", [_number(e) for e in errors]),
+            _row("", "time [s]", [_number(each) for each in times]),
+            _row("", "lines", [str(cell.lines) if cell else "-" for cell in own], mark=False),
+            _row("", "physics named", [_named(cell) for cell in own], mark=False),
+        ]
     return lines
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None or value == float("inf") else f"{value:.3g}"
+
+
+def _named(cell: Cell | None) -> str:
+    """What a user's result says of the physics, short enough for a column."""
+    if cell is None:
+        return "not installed"
+    named = cell.named.replace("|", "\\|")
+    return "given by the user" if named.startswith("written by the user") else named
+
+
+def _row(name: str, what: str, cells: Sequence[str], *, mark: bool = True) -> str:
+    """A row of the table, with its smallest number bold."""
+    numbers = [float(cell) for cell in cells if mark and cell != "-"]
+    least = min(numbers, default=None)
+    shown = [
+        f"**{cell}**" if mark and cell != "-" and float(cell) == least else cell for cell in cells
+    ]
+    return f"| {name} | {what} | {' | '.join(shown)} |"
+
+
+def summary(found: Sequence[Cell], chosen: Sequence[Task]) -> str:
+    """Who is best in what, in a sentence for each data set."""
+    told = []
+    for task in chosen:
+        ended = [c for c in found if c.task == task.name and c.error < float("inf")]
+        if ended:
+            best = NAMES[min(ended, key=lambda cell: cell.error).user]
+            fastest = NAMES[min(ended, key=lambda cell: cell.seconds).user]
+            told.append(f"* {task.name}: smallest error {best}, fastest {fastest}.")
+    return "\n".join(told)
 
 
 def write(found: Sequence[Cell], chosen: Sequence[Task]) -> None:
     """Write the page of these results."""
     done = "\n".join(f"| {user} | {what} |" for user, what in DONE.items())
-    lines = [HEAD.format(done=done).rstrip()]
-    for task in chosen:
-        lines += table(task, [cell for cell in found if cell.task == task.name])
+    lines = [HEAD.format(done=done), *table(found, chosen), "", summary(found, chosen)]
     TARGET.write_text("\n".join(lines) + "\n" + TAIL.format(**machine()), "utf-8")
 
 

@@ -241,7 +241,7 @@ def _fit(row: Suspect) -> str:
     """An effect, its physics, and how well it explains the change."""
     physics = row.physics.strip().rstrip(".")
     plain = f" ({physics[0].lower()}{physics[1:]})" if physics else ""
-    share = f"explains {row.explained:.0%} of the change"
+    share = f"explains {row.explained:.0%} of the energy of the residual's change"
     return f"{row.label}{plain}: {share}, by chance {_chance(row.p_value)}"
 
 

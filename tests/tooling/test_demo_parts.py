@@ -196,7 +196,7 @@ def test_a_run_that_nobody_watches_ends_with_the_cause_told_or_a_while_after_the
 def test_what_is_missing_in_the_model_is_told_and_other_events_are_not() -> None:
     said: list[str] = []
     narrator = narrator_to(said)
-    found = "coulomb@load (dry surfaces resist sliding): explains 99% of the change"
+    found = "coulomb@load (dry surfaces resist sliding): explains 99% of the energy of the change"
     text = f"dry_friction: probably missing: {found}"
     narrator.explain(Event("daq", 0, "warning", "CLOCK STEP", "the clock stepped"))
     assert not narrator.explained

@@ -12,6 +12,7 @@ from mcap.reader import make_reader
 
 from rigwatch.commands import main
 from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.exchange import ImportMapping, import_file
 from rigwatch.wire.messages import encode
 from rigwatch.wire.messages.message_types import (
     Alarm,
@@ -148,6 +149,18 @@ def test_trim_refuses_an_empty_span_and_keeps_no_file(
     assert main(["trim", str(session), str(target), "--start", "soon"]) == 2
     assert "--start: found 'soon', expected seconds" in capsys.readouterr().err
     assert not target.exists()
+
+
+def test_times_of_a_log_without_a_date_are_told_in_seconds(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, session = tmp_path / "run.csv", tmp_path / "run.mcap"
+    log.write_text("t,u\n" + "".join(f"{5 + 0.01 * i:.2f},{i}\n" for i in range(201)))
+    import_file(log, session, ImportMapping(channels={"voltage": "u[V]"}, time="t[s]"))
+    assert main(["trim", str(session), str(tmp_path / "b.mcap"), "--start", "9"]) == 2
+    first = summarise(open_session(session)).start_ns / 1e9
+    told = f"found no samples from {first + 9:.3f} s to the end"
+    assert f"{told}, expected a part of {first:.3f} s to" in capsys.readouterr().err
 
 
 def test_recover_a_killed_and_damaged_session(

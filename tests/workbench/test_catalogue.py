@@ -54,6 +54,26 @@ def test_what_no_output_shows_and_nothing_uses_is_reported() -> None:
     assert found.start == ("x", "a", "b")
 
 
+NEVER_NEGATIVE = ("kg", "kg m^2", "m^2", "m^3", "ohm", "H", "J/K")
+"""Units of masses, inertias, areas, volumes, resistances, inductances and heat capacities."""
+
+
+@pytest.mark.parametrize("name", sorted(shipped_models()))
+def test_what_cannot_be_negative_is_bounded_in_every_model_that_ships(name: str) -> None:
+    model = shipped_models()[name]
+    sets = [model.parameters, *(variant.parameters for variant in model.variants.values())]
+    sized = {n: p for each in sets for n, p in each.items() if p.unit in NEVER_NEGATIVE}
+    assert not {n: p.low for n, p in sized.items() if p.low < 0}
+
+
+def test_a_fixed_parameter_without_bounds_is_reported() -> None:
+    text = UNSEEN + 'parameters.given = { value = 2.0, unit = "1", fixed = true }\n'
+    assert model_report(parse(text, Model, "given"), {}).unbounded == ("given",)
+    assert not model_report(parse(UNSEEN, Model, "unseen"), {}).unbounded
+    bounded = text.replace("fixed = true", "fixed = true, low = 0.0")
+    assert not model_report(parse(bounded, Model, "given"), {}).unbounded
+
+
 def test_what_suits_a_port_is_counted_and_a_variable_that_no_effect_reads_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

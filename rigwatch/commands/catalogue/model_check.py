@@ -70,6 +70,11 @@ def _lines(name: str, report: "ModelReport") -> list[str]:
             "a temperature that multiplies something: 0 degC are 273.15 K; give a difference in K",
         ),
         (
+            report.unbounded,
+            "fixed and without bounds, so that a study may give it any value: low = 0.0 refuses a"
+            " negative one",
+        ),
+        (
             report.unread,
             "no effect of the library uses a variable of this name; theirs are"
             f" {', '.join(sorted(variables_known()))}",

@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
             }
         )
         return 0
-    print("\n".join([*_model_lines(study), *_step_lines(steps)]))
+    print("\n".join([*_model_lines(study), *_step_lines(study, steps)]))
     return 0
 
 
@@ -54,19 +54,25 @@ def _model_lines(study: "Study") -> list[str]:
     return lines
 
 
-def _step_lines(steps: "Sequence[Mapping[str, Any]]") -> list[str]:
-    """A table of the ledger."""
+def _step_lines(study: "Study", steps: "Sequence[Mapping[str, Any]]") -> list[str]:
+    """A table of the ledger, with errors in the unit in which the other commands tell them."""
     from rigwatch.workbench.report import number, table
+    from rigwatch.workbench.study import told
 
-    rows = [
-        [
-            line["time"],
-            line["step"],
-            f"{line['effect']}@{line['port']}" if "effect" in line else "",
-            number(line.get("train_error")),
-            number(line.get("held_out_error")),
-            line.get("unit", ""),
-        ]
-        for line in steps
-    ]
+    rows = []
+    for line in steps:
+        unit = _told_unit(study, line.get("unit", ""))
+        errors = [line.get("train_error"), line.get("held_out_error")]
+        shown = [None if error is None else told(error, unit) for error in errors]
+        effect = f"{line['effect']}@{line['port']}" if "effect" in line else ""
+        rows.append([line["time"], line["step"], effect, *map(number, shown), unit])
     return table(["time", "step", "effect", "training", "held out", "unit"], rows)
+
+
+def _told_unit(study: "Study", kept: str) -> str:
+    """The unit that tells errors which the ledger keeps in another: that of the only output."""
+    from rigwatch.workbench.study import told_unit
+
+    outputs = list(study.model.outputs.values())
+    alone = len(outputs) == 1 and outputs[0].unit == kept
+    return told_unit(outputs[0]) if alone else kept

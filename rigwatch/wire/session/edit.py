@@ -16,6 +16,8 @@ from rigwatch.wire.session.writer import SessionWriter, message_time, run_info
 
 FLUSH_EVERY = 4096
 """Messages per chunk."""
+_DATED_NS = round(datetime(2000, 1, 1, tzinfo=UTC).timestamp() * 1e9)
+"""Earliest Unix time that is a date [ns]; imported logs may begin at zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +113,12 @@ def _text(t_ns: int | None, otherwise: str) -> str:
 
 
 def iso_time(t_ns: int) -> str:
-    """Unix time as text: UTC, to the millisecond."""
+    """Unix time as text: UTC, to the millisecond; seconds where it is none.
+
+    A log without a date begins at zero, or at the seconds that its logger counts.
+    """
+    if t_ns < _DATED_NS:
+        return f"{t_ns / 1e9:.3f} s"
     whole, rest = divmod(t_ns, 1_000_000_000)
     text = datetime.fromtimestamp(whole, UTC).strftime("%Y-%m-%dT%H:%M:%S")
     return f"{text}.{rest // 1_000_000:03d}Z"

@@ -16,6 +16,7 @@ FINDINGS = {
     "unseen": "no output depends on it, so no recording can determine it",
     "tied": "the outputs cannot distinguish it from another of these",
     "start": "no channel measures it: a fit estimates its initial value from the outputs",
+    "unbounded": "fixed and without bounds, so that a study may give it any value",
     "unread": "no effect of the library uses a variable of this name",
 }
 """Findings of a model's report, in words."""

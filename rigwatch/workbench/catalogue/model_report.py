@@ -6,6 +6,7 @@ unobservable; states with linearly dependent columns cannot be distinguished (R.
 A. J. Krener, IEEE TAC 22(5), 1977; here numerically, along one run).
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -47,6 +48,7 @@ class ModelReport:
         tied: states that the outputs cannot distinguish.
         start: states that no channel measures, which start at the file's values.
         absolute: parameters in degC or degF that multiply something, as only a difference would.
+        unbounded: fixed parameters without `low` and `high`, so that any value is taken.
         entering: number of effects of the library that suit each port, by its name.
         unread: variables of ports that no effect of the library uses, as "port.variable".
         step: step size of the inputs that are not given.
@@ -59,6 +61,7 @@ class ModelReport:
     tied: tuple[str, ...]
     start: tuple[str, ...]
     absolute: tuple[str, ...]
+    unbounded: tuple[str, ...]
     entering: Mapping[str, int]
     unread: tuple[str, ...]
     step: float
@@ -94,6 +97,7 @@ def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> 
         tied=(),
         start=start,
         absolute=_absolute_factors(model, system),
+        unbounded=_unbounded(model),
         entering=entering(model),
         unread=unread(model),
         step=0.0,
@@ -159,6 +163,12 @@ def _absolute_factors(model: Model, system: System) -> tuple[str, ...]:
     }
     given = {name: unit_of(p.shown or p.unit) for name, p in model.parameters.items()}
     return tuple(n for n, unit in given.items() if n in factors and unit.from_si(0.0) != 0)
+
+
+def _unbounded(model: Model) -> tuple[str, ...]:
+    """Parameters whose value is given and kept within nothing."""
+    given = {name: p for name, p in model.parameters.items() if p.fixed}
+    return tuple(n for n, p in given.items() if math.isinf(p.low) and math.isinf(p.high))
 
 
 def _run(system: System, inputs: Mapping[str, float]) -> tuple[FloatArray, FloatArray, FloatArray]:

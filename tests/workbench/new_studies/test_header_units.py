@@ -8,6 +8,7 @@ import pytest
 from rigwatch.commands import main
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data.signals import prepare
+from rigwatch.workbench.study.ledger import append
 from rigwatch.workbench.study.study import open_study
 from rigwatch.workbench.study.told_units import told_unit
 from sim_plant.machines import MACHINES, log
@@ -47,6 +48,16 @@ def test_usual_spellings_of_a_unit_are_read(tmp_path, run, header):
     path.write_text(path.read_text().replace('"rpm"', '"V"'))
     with pytest.raises(ModelError, match=r"shown\.speed: .*'V'"):
         open_study(tmp_path / "study")
+
+
+def test_the_steps_of_a_study_are_told_in_the_unit_of_its_log(tmp_path, run, capsys):
+    assert made(tmp_path, run, "Speed [rpm]") == 0
+    study = open_study(tmp_path / "study")
+    step = {"train_error": 0.1 * np.pi, "held_out_error": 0.2 * np.pi, "unit": "rad/s"}
+    append(study, "add", effect="coulomb", port="shaft", **step)
+    assert main(["study", "show", str(study.folder)]) == 0
+    shown = capsys.readouterr().out.splitlines()[-1]
+    assert shown.split()[-4:] == ["coulomb@shaft", "3", "6", "rpm"]
 
 
 def test_a_unit_that_is_not_known_is_asked_for(tmp_path, run, capsys):

@@ -76,6 +76,24 @@ def test_a_known_value_out_of_its_bounds_is_refused_at_once(tmp_path, run, capsy
     assert not (tmp_path / "study").exists()
 
 
+@pytest.mark.parametrize("option", ["R=-2", "run:R=-2"])
+def test_a_fixed_value_out_of_its_bounds_is_refused_at_once(tmp_path, run, capsys, option):
+    data, study = written(tmp_path / "run.csv", run), tmp_path / "study"
+    options = ["--model", "motor", "--set", "K=0.06", "--set", option]
+    assert main(["study", "new", str(study), "--data", str(data), *options]) == 2
+    assert "--set: found R = -2, expected at least 1e-06 ohm" in capsys.readouterr().err
+    assert not study.exists()
+
+
+def test_a_study_file_that_gives_a_fixed_value_out_of_its_bounds_is_refused(tmp_path, run, capsys):
+    assert new(tmp_path, written(tmp_path / "run.csv", run)) == 0
+    file = tmp_path / "study" / "study.toml"
+    file.write_text(file.read_text().replace("R = 2.0", "R = -2.0"))
+    assert main(["compare", str(tmp_path / "study")]) == 2
+    told = capsys.readouterr().err
+    assert f"{file}: start.R: found -2, expected at least 1e-06 ohm" in told
+
+
 def test_a_time_under_another_name_is_asked_for_and_may_be_named_as_it_stands(
     tmp_path, run, capsys
 ):
