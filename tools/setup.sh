@@ -54,7 +54,7 @@ progress() {
     count=0
     while read -r word rest; do
         case "$word $rest" in
-        "Collecting "*" (from -r "*)
+        "Collecting "*" (from -r "* | "Processing "*" (from -r "*) # from an index, from a folder
             count=$((count + 1))
             if [ $((count % 10)) = 0 ]; then echo "setup:   $count of $1 are here"; fi
             ;;

@@ -8,6 +8,7 @@ from the sample that raises the alarm (`notified_faults.py`), so its persistence
 
 import json
 import random
+import re
 import threading
 import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -18,7 +19,7 @@ import numpy as np
 
 from benchmarks.processes.notified_faults import delays
 from rigwatch.wire.messages import ALARMS as TOPIC
-from rigwatch.wire.messages import Alarm
+from rigwatch.wire.messages import HEALTH, Alarm
 from tests.bus.rig import TestRig
 from tests.waiting import eventually
 from tools.benchmark_table import Row
@@ -27,6 +28,8 @@ BAR_S = 1.0
 ALARMS = 500
 """Alarms of one rig: of more different ones than a monitor can have, listeners take no notice."""
 _NONE = float("nan")
+_HEADLINE = re.compile(r"^(?:warning|error|critical): ([^\s:,]+)", re.MULTILINE)
+"""An alarm in the title of a message, or in a line of one of many."""
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -34,7 +37,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_POST(self) -> None:
         body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
-        self.server.got[body["title"].rpartition(" ")[2]] = time.monotonic()
+        self.server.note(body["title"], body["message"])
         self.send_response(200)
         self.end_headers()
 
@@ -43,12 +46,18 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 class Webhook(ThreadingHTTPServer):
-    """Notes when each alarm arrives."""
+    """Notes when each alarm arrives, alone or with others in one message."""
 
     def __init__(self) -> None:
         self.got: dict[str, float] = {}
         super().__init__(("127.0.0.1", 0), _Handler)
         threading.Thread(target=self.serve_forever, daemon=True).start()
+
+    def note(self, title: str, text: str) -> None:
+        """Note the alarms of a message."""
+        now = time.monotonic()
+        for name in _HEADLINE.findall(f"{title.partition('] ')[2]}\n{text}"):
+            self.got.setdefault(name, now)
 
     def people(self) -> str:
         """A file of people with this webhook as the only one."""
@@ -97,15 +106,16 @@ def _delays(folder: Path, hook: Webhook, chance: random.Random, count: int) -> n
         rig.router()
         monitor = rig.bus("monitor")
         rig.start("-m", "rigwatch", "witness", str(rig.path))
-        eventually(lambda: "alive/witness" in monitor.tokens("alive/*"), "the witness")
-        time.sleep(2.0)
+        # Its first report says that it listens; its token appears before.
+        healths = monitor.subscribe(HEALTH)
+        eventually(lambda: any(one.source == "witness" for one in healths.drain()), "the witness")
         sent: dict[str, float] = {}
         for number in range(count):
             name = f"alarm-{number}"
             sent[name] = time.monotonic()
             monitor.publish(TOPIC, _alarm(name))
             time.sleep(chance.uniform(0.05, 0.35))
-        eventually(lambda: len(hook.got) == count, "all notifications")
+        eventually(lambda: sent.keys() <= hook.got.keys(), "all notifications")
     return np.array([hook.got[name] - at for name, at in sent.items()])
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from monitor.alarms import read_journal
 from rigwatch.wire.bus import Bus
 from rigwatch.wire.delivery import SampleRing
-from rigwatch.wire.messages import ESTIMATES, NON_FINITE, SAMPLES, SATURATED, SampleBlock
+from rigwatch.wire.messages import ESTIMATES, HEALTH, NON_FINITE, SAMPLES, SATURATED, SampleBlock
 from tests.bus.publisher import wave
 from tests.bus.rig import TestRig
 from tests.monitor_process.model import monitor_section
@@ -85,8 +85,10 @@ def _of_one(folder: Path, people: str, got: dict[str, float], chance: random.Ran
         for process in ("monitor", "witness"):
             rig.start("-m", "rigwatch", process, str(rig.path))
         source, stop = Source(rig.bus("daq")), threading.Event()
-        there = {"alive/monitor", "alive/witness"}
-        eventually(lambda: there <= set(source.bus.tokens("alive/*")), "monitor and witness")
+        # The monitor reports once samples come; the witness's first report says that it listens.
+        healths = source.bus.subscribe(HEALTH)
+        eventually(lambda: "alive/monitor" in source.bus.tokens("alive/*"), "the monitor")
+        eventually(lambda: any(one.source == "witness" for one in healths.drain()), "the witness")
         estimates = rig.bus("observer").subscribe_lossy(ESTIMATES)
         thread = threading.Thread(target=source.serve, args=(stop,), daemon=True)
         thread.start()

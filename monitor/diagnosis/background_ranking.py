@@ -4,7 +4,6 @@ The ranking itself is in `fault_candidates.py` and runs in a separate process; t
 the samples, requests the ranking and handles the answer.
 """
 
-import contextlib
 import queue
 import tempfile
 import threading
@@ -16,9 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from monitor.diagnosis.child import Child
-from monitor.diagnosis.ranking_job import ask
+from monitor.diagnosis.ranking_job import ask, failed
 from monitor.model import RigModel
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.errors import reason_of
 from rigwatch.wire.messages import (
     PROBABLY_MISSING,
     Alarm,
@@ -122,12 +122,13 @@ class Explainer:
     def _rank(self, judged: Sequence[Judged], alarm: Alarm, model: RigModel, force: float) -> None:
         signals, change = _arrays(judged, model.channels)
         onset = max(alarm.onset_seq - judged[0][0].seq, 0)
-        text = ""
-        with contextlib.suppress(OSError), tempfile.TemporaryDirectory() as folder:
-            text = ask(Path(folder), signals, change, onset, model, self._files, self._child)
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                text = ask(Path(folder), signals, change, onset, model, self._files, self._child)
+        except OSError as error:
+            text = failed(f"its process could not be started: {reason_of(error)}")
         if self._ended:
             return
-        text = text or "probably missing: cannot tell, the ranking failed"
         if force > 0.0:
             # The force at the name is of a part of a period, in which contacts are still settling.
             text += f"; the friction is {force:.2g} N by now"

@@ -15,17 +15,24 @@ class Child:
         self._number: int | None = None
         self._ended = False
 
-    def run(self, words: Sequence[str]) -> None:
-        """Start Python with these arguments and wait until it has ended; nothing after `end`."""
+    def run(self, words: Sequence[str]) -> int:
+        """Start Python with these arguments and wait until it has ended; nothing after `end`.
+
+        Returns:
+            its exit code; that of a process that a signal has ended is the negative signal.
+
+        Raises:
+            OSError: it cannot be started.
+        """
         with self._lock:
             if self._ended:
-                return
+                return 0
             self._number = number = _started(words)
         # The number stays the child's until it is waited for, so that `end` kills nobody else.
         os.waitid(os.P_PID, number, os.WEXITED | os.WNOWAIT)
         with self._lock:
             self._number = None
-            os.waitpid(number, 0)
+            return os.waitstatus_to_exitcode(os.waitpid(number, 0)[1])
 
     def end(self) -> None:
         """Kill the child, or keep it from starting."""

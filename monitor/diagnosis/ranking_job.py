@@ -36,13 +36,30 @@ def ask(  # noqa: PLR0917 -- what is put into the folder
     effect_files: Sequence[str],
     child: Child | None = None,
 ) -> str:
-    """Wait for the ranking as text; empty if the job failed or its `child` was ended."""
+    """Wait for the ranking as text; if the job or its `child` was ended, why there is none.
+
+    Raises:
+        OSError: the folder cannot be written, or the job not started.
+    """
     np.savez(folder / _EVIDENCE, signals=signals, change=change, onset=onset)
     (folder / _MODEL).write_text(model_text(model), encoding="utf-8")
     (folder / _EFFECTS).write_text(json.dumps(list(effect_files)), encoding="utf-8")
-    (child or Child()).run(["-m", MODULE, str(folder)])
+    code = (child or Child()).run(["-m", MODULE, str(folder)])
     answer = folder / _ANSWER
-    return answer.read_text(encoding="utf-8") if answer.exists() else ""
+    return answer.read_text(encoding="utf-8") if answer.exists() else failed(_why(code))
+
+
+def failed(why: str) -> str:
+    """The text of a ranking that has failed."""
+    return f"probably missing: cannot tell, the ranking failed: {why}"
+
+
+def _why(code: int) -> str:
+    if code == -signal.SIGALRM:
+        return f"it took more than {LONGEST} s"
+    if code < 0:
+        return f"its process was ended by {signal.Signals(-code).name}"
+    return f"its process ended with code {code}, the monitor's output says more"
 
 
 def answer(folder: Path) -> str:

@@ -12,7 +12,8 @@ from rigwatch.archive.indexing import Indexed, index
 from rigwatch.archive.query import Answer, Bounds, ask, query
 from rigwatch.archive.questions import QUESTIONS, Question
 from rigwatch.archive.recordings import Anywhere, content_anywhere, sessions_at
-from rigwatch.archive.retain import Retained, retain
+from rigwatch.archive.retention.oldest import Thinned, thin_oldest
+from rigwatch.archive.retention.retain import Retained, retain
 from rigwatch.archive.store import Store
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "Retained",
     "Shown",
     "Store",
+    "Thinned",
     "ask",
     "content_anywhere",
     "index",
@@ -32,4 +34,5 @@ __all__ = [
     "retain",
     "sessions_at",
     "show",
+    "thin_oldest",
 ]

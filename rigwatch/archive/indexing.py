@@ -4,7 +4,7 @@ The catalogue is written after each batch, so that an index that was stopped con
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from typing import Any
@@ -15,9 +15,9 @@ from rigwatch.archive.catalogue import FAILED, Catalogue, Row, load, save
 from rigwatch.archive.entry import Entry, catalogued, entries
 from rigwatch.archive.layout import INDEX, SECONDS
 from rigwatch.archive.one_writer import one_writer
+from rigwatch.archive.retention.thinning import finish_thinning
 from rigwatch.archive.store import Store, Stored
 from rigwatch.archive.tables import pyarrow
-from rigwatch.archive.thinning import finish_thinning
 from rigwatch.batch import Job, Outcome, map_units
 
 BATCH = 500
@@ -46,7 +46,12 @@ class Indexed:
 
 
 def index(
-    store: Store, *, executor: Workers = None, say: Say = lambda _: None, batch: int = BATCH
+    store: Store,
+    *,
+    executor: Workers = None,
+    say: Say = lambda _: None,
+    batch: int = BATCH,
+    only: Collection[str] | None = None,
 ) -> Indexed:
     """Bring the index of an archive up to date.
 
@@ -55,6 +60,7 @@ def index(
         executor: reads sessions; None reads them in this process.
         say: called with progress.
         batch: sessions between two writings of the catalogue.
+        only: of what is new or has changed, read these alone.
 
     Raises:
         ArchiveError: the archive cannot be read or written.
@@ -64,14 +70,17 @@ def index(
     pyarrow()
     store.check()
     with one_writer(store):
-        return _indexed(store, executor, say, batch)
+        return _indexed(store, executor, say, batch, only)
 
 
-def _indexed(store: Store, executor: Workers, say: Say, batch: int) -> Indexed:
+def _indexed(
+    store: Store, executor: Workers, say: Say, batch: int, only: Collection[str] | None
+) -> Indexed:
     kept = load(store)
     finish_thinning(store, kept, outside_index(store))
     found = {entry.name: entry for entry in entries(outside_index(store))}
     due = sorted(set(found) - kept.still_right({name: e.stamp for name, e in found.items()}))
+    due = due if only is None else [name for name in due if name in only]
     gone = kept.with_recording() - set(found)
     kept.forget(gone | set(due))
     for start in range(0, max(1, len(due)), batch):

@@ -4,6 +4,7 @@ import glob
 import os
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from importlib.util import find_spec
 from pathlib import Path
 
 from rigwatch.doctor.finding import Finding, judged
@@ -43,6 +44,7 @@ def check_rig(path: Path, *, fix: bool = False) -> Iterator[Finding]:
     config = load_rig(path)
     yield from check_kept(config, path, fix=fix)
     yield from check_files(config)
+    yield from check_thinning(config)
     yield from check_keys(config)
     yield from check_ports(config)
     yield from check_device(config)
@@ -95,6 +97,18 @@ def check_files(config: RigConfig) -> Iterator[Finding]:
             yield Finding("scenario", "fail", str(error), "correct it, or plant.scenario")
         else:
             yield Finding("scenario", "ok", config.plant.scenario)
+
+
+def check_thinning(config: RigConfig) -> Iterator[Finding]:
+    """What the recorder needs to thin old sessions is installed."""
+    recorder = config.recorder
+    if recorder is None or not (recorder.thin_days or recorder.thin_alarm_days):
+        return
+    missing = [name for name in ("pyarrow", "fsspec") if find_spec(name) is None]
+    limits = {"thin_days": recorder.thin_days, "thin_alarm_days": recorder.thin_alarm_days}
+    ages = ", ".join(f"{name} {days:g}" for name, days in limits.items() if days)
+    text = f"{ages}: " + (f"{', '.join(missing)} not installed" if missing else "by the recorder")
+    yield judged("thinning", not missing, text, "pip install 'rigwatch[archive]'")
 
 
 def check_ports(config: RigConfig) -> Iterator[Finding]:

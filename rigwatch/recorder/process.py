@@ -21,6 +21,7 @@ from rigwatch.recorder.resuming import of_living
 from rigwatch.recorder.retention import Retention
 from rigwatch.recorder.session_length import SessionLength
 from rigwatch.recorder.store import Store
+from rigwatch.recorder.thinning import Thinning
 from rigwatch.wire.bus import Bus, joined
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.host import Heartbeat, Kept, Pulse, free_share, use_few_pools
@@ -67,6 +68,7 @@ class Recorder:
         self._settled = self._noted = 0
         self._disk = DiskWatch()
         self._retention = Retention(self.settings, config.rig.id)
+        self._thinning = Thinning(self.settings, config.rig.id)
         self._told_at = -HEALTH_EVERY
         self._told_trouble = self._trouble()
         self._positions = PositionFile(place.folder)
@@ -87,6 +89,7 @@ class Recorder:
         due = now - self._told_at >= HEALTH_EVERY
         if due:
             self._tell(self._retention.update(now, t_ns, self.store.folder))
+            self._tell(self._thinning.update(now, t_ns))
         if due or self._trouble() != self._told_trouble:
             self._told_at, self._told_trouble = now, self._trouble()
             self._bus.publish(HEALTH, self._health(share, t_ns))
@@ -150,6 +153,7 @@ class Recorder:
 
     def close(self, now: float, t_ns: int) -> None:
         """Write waiting messages and close the session."""
+        self._thinning.close()
         for message in [*self.feed.take(), *self.feed.rest()]:
             self.store.add(message)
         self.feed.close()

@@ -259,6 +259,18 @@ class RecorderSection(Section, frozen=True):
             "those with alarms last [GB]; 0 for no limit",
         ),
     ] = 0.0
+    thin_days: Annotated[
+        float,
+        Meta(
+            ge=0,
+            description="age at which sessions are thinned in the background: least, mean and "
+            "largest value of each second stay; needs `session_days` and `rigwatch[archive]` "
+            "[days]; 0 for never",
+        ),
+    ] = 0.0
+    thin_alarm_days: Annotated[
+        float, Meta(ge=0, description="the same for sessions with alarms [days]; 0 for never")
+    ] = 0.0
 
 
 class WitnessSection(Section, frozen=True):
@@ -387,7 +399,21 @@ def load_rig(path: Path | str) -> RigConfig:
             least = f"at least {2.0 * config.interval:.3g} s, two periods or polls of the device"
             key, found = f"{section}.stale_after", f"{silence:g} s"
             raise ConfigError(holder(path, section), key, found, least)
+    _check_thinning(config.recorder or RecorderSection(), path)
     return config
+
+
+def _check_thinning(recorder: RecorderSection, path: Path | str) -> None:
+    """Sessions have an end, and are thinned before they are removed."""
+    limits = {"thin_days": recorder.keep_days, "thin_alarm_days": recorder.keep_alarm_days}
+    for name, removed in limits.items():
+        days, key = getattr(recorder, name), f"recorder.{name}"
+        if days and not recorder.session_days:
+            found = f"{days:g} days, of sessions that do not end"
+            raise ConfigError(holder(path, "recorder"), key, found, "also recorder.session_days")
+        if days and removed and removed <= days:
+            found = f"{days:g} days, of recordings that are removed after {removed:g} days"
+            raise ConfigError(holder(path, "recorder"), key, found, "thinning before removal")
 
 
 def rig_text(path: Path | str) -> str:

@@ -7,7 +7,7 @@ from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.messages import Alarm
 from rigwatch.wire.rig_config import WitnessSection
 from rigwatch.witness.delivery import Delivery
-from rigwatch.witness.notices import Notices
+from rigwatch.witness.notices import SEEN, Notices
 from rigwatch.witness.people import load_people
 
 BETWEEN_LOOKS = 2.0
@@ -40,6 +40,8 @@ class Announcer:
     def hear(self, alarm: Alarm, now: float) -> None:
         """Take note of a change of an alarm; `now` is monotonic time [s]."""
         self._notices.hear(alarm, now)
+        if alarm.state in SEEN:
+            self._delivery.withdraw(alarm.name)
 
     def turn(self, now: float, t_ns: int) -> None:
         """Queue what is due; `now` is monotonic time [s], `t_ns` Unix time [ns]."""

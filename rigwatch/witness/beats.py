@@ -8,8 +8,7 @@ from pathlib import Path
 
 from rigwatch.wire.errors import ConfigError, reason_of
 from rigwatch.wire.host import replace_file
-from rigwatch.witness.bounded import Bounded
-from rigwatch.witness.http_ping import why_not
+from rigwatch.witness.addresses import Bounded, why_not
 
 TIMEOUT = 5.0
 """Longest wait for each part of the answer to a ping [s]."""

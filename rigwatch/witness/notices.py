@@ -5,12 +5,15 @@ those of the night, are the ones that nobody sees. What came and went within a m
 not, as the work causes it.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from datetime import datetime
 
 from rigwatch.wire.messages import MOST_ALARMS, Alarm
 from rigwatch.witness.people import SEVERITIES, PeopleFile, RecipientSection
 
+SEEN = ("acknowledged", "normal")
+"""States of an alarm that somebody has seen or that needs nobody."""
 AGAIN_S = 600.0
 """Time after its end in which an alarm that comes again, seen by nobody, is the same one [s]: a
 monitor that is restarted again and again would send a notice each time."""
@@ -63,7 +66,7 @@ class Notices:
 
     def hear(self, alarm: Alarm, now: float) -> None:
         """Take note of a change of an alarm; `now` is monotonic time [s]."""
-        if alarm.state in ("acknowledged", "normal"):
+        if alarm.state in SEEN:
             self._unseen.pop(alarm.name, None)
             return
         unseen = self._unseen.setdefault(alarm.name, _Unseen(alarm, now))
@@ -111,3 +114,8 @@ def _is_due(unseen: _Unseen, recipient: RecipientSection, now: float) -> bool:
         again = recipient.repeat_minutes * 60.0
         return again > 0 and now - unseen.told[recipient.name][0] >= again
     return now - unseen.since >= recipient.after_minutes * 60.0
+
+
+def by_severity(notices: Iterable[Notice]) -> list[Notice]:
+    """The worst first, of these the first."""
+    return sorted(notices, key=lambda one: (-SEVERITIES.index(one.alarm.severity), one.alarm.t_ns))

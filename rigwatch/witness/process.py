@@ -3,6 +3,7 @@
 python -m rigwatch witness CONFIG
 """
 
+import contextlib
 import threading
 import time
 
@@ -44,6 +45,9 @@ LEAST_SILENCE = 1.0
 FOR_MONITOR = 30.0
 """Time allowed until a monitor's first estimate [s]."""
 
+ASKED_AGAIN = 10.0
+"""Time after which a monitor that has not told its standing alarms is asked again [s]."""
+
 
 class Witness:
     """Supervises the monitor of one rig.
@@ -83,8 +87,9 @@ class Witness:
         self._unheard = self._stale.holds
         self._commands = bus.subscribe(COMMANDS)
         self._told_at = now - 1.0
-        for alarm in _standing(bus):
-            self._hear(alarm, now)
+        self._knows_standing = False
+        self._asked_at = now
+        self._learn_standing(now)
         serve_alarm_list(bus, lambda: list(filter(None, [self._stale.standing])))
 
     def turn(self, now: float, t_ns: int) -> None:
@@ -92,6 +97,8 @@ class Witness:
         if self._estimates.drain():
             self._silence.end(now)
             self._unheard = False
+            if not self._knows_standing and now - self._asked_at >= ASKED_AGAIN:
+                self._learn_standing(now)
         silent = self._silence.counted(now)
         stale = self._unheard or silent > self._stale_after
         for alarm in self._stale.judge(stale, silent, t_ns, self._link_trouble):
@@ -110,6 +117,17 @@ class Witness:
             return ""
         ended = keys_trouble(self._security, PROCESS)
         return "the router does not answer" + (f": {ended}" if ended else "")
+
+    def _learn_standing(self, now: float) -> None:
+        """Ask for the alarms that the monitor raised before this process was there.
+
+        Without an answer, of a monitor that has just started or is held up, it is asked again.
+        """
+        self._asked_at = now
+        with contextlib.suppress(BusError):
+            for alarm in ask_alarm_list(self._bus):
+                self._hear(alarm, now)
+            self._knows_standing = True
 
     def _hear(self, alarm: Alarm, now: float) -> None:
         self._announcer.hear(alarm, now)
@@ -144,14 +162,6 @@ class Witness:
         self._outputs.close()
         self._alarms.close()
         self._estimates.close()
-
-
-def _standing(bus: Bus) -> list[Alarm]:
-    """Alarms that the monitor raised before this process was there."""
-    try:
-        return ask_alarm_list(bus)
-    except BusError:
-        return []
 
 
 def patient(config: RigConfig) -> WitnessSection:

@@ -68,6 +68,13 @@ def test_clocks_that_overlap(store):
     assert row["seconds"] == pytest.approx(3, abs=0.1)
 
 
+def test_the_questions_are_listed_for_an_archive_that_is_there(root, tmp_path, capsys):
+    assert main(["archive", "query", str(root)]) == 0
+    assert "friction-growth" in capsys.readouterr().out
+    assert main(["archive", "query", str(tmp_path / "nowhere")]) == 2
+    assert "no such folder" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("name", QUESTIONS)
 def test_every_question_has_an_answer_on_the_command_line(root, name, capsys):
     assert main(["archive", "query", str(root), name, "--json"]) == 0

@@ -2,6 +2,7 @@
 
 import json
 import socket
+import sys
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -50,6 +51,15 @@ def test_this_machine_can_run_the_tests() -> None:
 
 def test_a_good_configuration_has_nothing_to_complain_about(tmp_path: Path) -> None:
     assert set(levels(tmp_path).values()) == {"ok"}
+
+
+def test_thinning_needs_the_packages_of_an_archive(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    more = "[recorder]\nsession_days = 1\nthin_days = 30"
+    assert levels(tmp_path, more=more)["thinning"] == "ok"
+    monkeypatch.setitem(sys.modules, "pyarrow", None)  # as if it were not installed
+    assert levels(tmp_path, more=more)["thinning"] == "fail"
 
 
 def test_a_misspelt_key_is_named_and_nothing_else_is_guessed(tmp_path: Path) -> None:

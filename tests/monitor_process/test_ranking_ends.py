@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from monitor.diagnosis import background_ranking
+from monitor.diagnosis import background_ranking, ranking_job
 from monitor.diagnosis.background_ranking import Explainer
 from monitor.diagnosis.child import Child
 from monitor.model import load_model
@@ -81,4 +81,24 @@ def test_a_ranking_that_cannot_be_started_is_told(monkeypatch: pytest.MonkeyPatc
     explained(explainer)
     found = []
     eventually(lambda: found.extend(explainer.results()) or found, "an answer")
-    assert "the ranking failed" in found[0].text
+    why = "the ranking failed: its process could not be started: no space left on the disk"
+    assert why in found[0].text
+
+
+@pytest.mark.parametrize(
+    ("code", "why"),
+    [
+        ("import os, signal; os.kill(os.getpid(), signal.SIGALRM)", "it took more than 300 s"),
+        ("import os; os.abort()", "its process was ended by SIGABRT"),
+        ("raise SystemExit(3)", "its process ended with code 3"),
+    ],
+)
+def test_why_a_ranking_has_ended_without_an_answer_is_told(
+    code: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "endings.py").write_text(code)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(ranking_job, "MODULE", "endings")
+    (tmp_path / "job").mkdir()
+    text = ranking_job.ask(tmp_path / "job", np.zeros((1, 1)), np.zeros(1), 0, RIG, ())
+    assert text.startswith(f"probably missing: cannot tell, the ranking failed: {why}")

@@ -127,6 +127,8 @@ def test_each_fault_is_told_with_the_commands_to_look_at_it_and_to_acknowledge_i
         "rigwatch ack rig.toml dry_friction",
         "rigwatch ack rig.toml other_fault",
     ]
+    kept = next(number for number, line in enumerate(said) if "an alarm is kept" in line)
+    assert "rigwatch alarms" in said[kept - 1]  # while the fault lasts
     advice = [line.strip() for line in said if "what to do" in line]
     assert advice == ["what to do: Stop and look."] * 3  # one a name, of which departure came twice
 

@@ -117,7 +117,8 @@ def environment(bare_path: Path, tmp_path: Path) -> Path:
         tmp_path / "venv" / "bin" / "python",
         """for last in "$@"; do :; done
 [ -f "$last" ] || exit 0
-sed -n 's/^[a-z].*/Collecting & (from -r lock.txt (line 1))/p' "$last"
+sed -n -e 's,^package1.*,Processing ./& (from -r lock.txt (line 1)),p' \
+    -e 's/^package[02-9].*/Collecting & (from -r lock.txt (line 1))/p' "$last"
 if grep -q refused "$last"; then echo 'ERROR: wrong hash' >&2; exit 1; fi
 echo 'Installing collected packages: all'""",
     )

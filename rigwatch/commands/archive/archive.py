@@ -10,4 +10,5 @@ ACTIONS = {
     "query": "archive.archive_query",
     "show": "archive.archive_show",
     "retain": "archive.archive_retain",
+    "thin": "archive.archive_thin",
 }

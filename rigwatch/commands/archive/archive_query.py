@@ -37,11 +37,12 @@ def run(arguments: argparse.Namespace) -> int:
     """0 on success."""
     from rigwatch.archive import QUESTIONS, Bounds, Store, ask, query
 
+    store = Store(arguments.url)
+    store.check()
     if arguments.query is None:
         questions = {name: question.text for name, question in QUESTIONS.items()}
         print_result(arguments, questions, table(("question", "answers"), questions.items()))
         return 0
-    store = Store(arguments.url)
     bounds = Bounds(rows=arguments.rows, seconds=arguments.seconds)
     if " " in arguments.query.strip():
         answer = query(store, arguments.query, bounds=bounds)

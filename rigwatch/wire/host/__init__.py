@@ -8,7 +8,14 @@ from rigwatch.wire.host.heartbeat import WAITS, Heartbeat
 from rigwatch.wire.host.one_keeper import Hold, Kept
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
 from rigwatch.wire.host.processes import end_process, end_with_parent, last_line
-from rigwatch.wire.host.realtime import DAQ, MONITOR, ROUTER, prepare_for_real_time, raise_priority
+from rigwatch.wire.host.realtime import (
+    DAQ,
+    MONITOR,
+    ROUTER,
+    be_idle,
+    prepare_for_real_time,
+    raise_priority,
+)
 from rigwatch.wire.host.side_by_side import Part, Pulse, RigPulse, Work, run_side_by_side
 from rigwatch.wire.host.whole_file import replace_file, write_through
 
@@ -24,6 +31,7 @@ __all__ = [
     "Pulse",
     "RigPulse",
     "Work",
+    "be_idle",
     "both_clocks",
     "end_process",
     "end_with_parent",

@@ -31,6 +31,14 @@ def raise_priority(urgency: int) -> None:
         os.setpriority(os.PRIO_PROCESS, 0, min(NICENESS, os.getpriority(os.PRIO_PROCESS, 0)))
 
 
+def be_idle() -> None:
+    """Let this process, with the threads that it starts, have only time that nobody else wants."""
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, 0, 19)
+    with contextlib.suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+
+
 def prepare_for_real_time() -> None:
     """Tune the garbage collector; call it once, after all set-up, before the loop.
 

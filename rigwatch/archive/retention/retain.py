@@ -14,8 +14,8 @@ from rigwatch.archive.catalogue import FAILED, Catalogue, Row, load, save
 from rigwatch.archive.entry import THINNED, UNFINISHED, UNREADABLE, Entry, entries
 from rigwatch.archive.indexing import outside_index, remove_unused
 from rigwatch.archive.one_writer import one_writer
+from rigwatch.archive.retention.thinning import finish_thinning, thin
 from rigwatch.archive.store import Store
-from rigwatch.archive.thinning import finish_thinning, thin
 from rigwatch.recorder import POSITIONS, expired
 from rigwatch.wire.errors import ArchiveError, SessionError
 from rigwatch.wire.rig_config import RecorderSection
@@ -65,6 +65,7 @@ def retain(
     now: datetime | None = None,
     remove: bool = False,
     keep_seconds: bool = False,
+    only: str = "",
     say: Callable[[str], None] = lambda _: None,
 ) -> Retained:
     """Find the sessions that rules remove from an archive, rig by rig, and remove them if wanted.
@@ -76,6 +77,7 @@ def retain(
         now: present time; by default the clock's.
         remove: remove the files; otherwise only find them.
         keep_seconds: keep the row, figures per second, alarms and losses of what is removed.
+        only: this session alone, which may be one that was cut off; "" for all.
         say: called with progress.
 
     Raises:
@@ -84,11 +86,11 @@ def retain(
     store.check()
     now_s = (now or datetime.now(UTC)).timestamp()
     if not remove:
-        return _found(store, _catalogue(store), rules, rig, now_s)
+        return _found(store, _catalogue(store), rules, rig, now_s, only=only)
     with one_writer(store):
         kept = _catalogue(store)
         finished = finish_thinning(store, kept, outside_index(store))
-        done = _found(store, kept, rules, rig, now_s)
+        done = _found(store, kept, rules, rig, now_s, only=only)
         if done.expired:
             found = {entry.name: entry for entry in entries(outside_index(store))}
             if keep_seconds:
@@ -106,13 +108,22 @@ def _catalogue(store: Store) -> Catalogue:
 
 
 def _found(
-    store: Store, kept: Catalogue, rules: RecorderSection, rig: str | None, now_s: float
+    store: Store,
+    kept: Catalogue,
+    rules: RecorderSection,
+    rig: str | None,
+    now_s: float,
+    *,
+    only: str,
 ) -> Retained:
     """What the rules say of the sessions that are there as the catalogue knows them."""
     found = {entry.name: entry for entry in entries(outside_index(store))}
     known = [row for name, row in kept.sessions.items() if _is_same(found.get(name), row)]
     done = Retained(len(kept.sessions), unknown=sorted(set(found) - {r["session"] for r in known}))
-    old = sorted((o for o in map(_old, known) if o and rig in (None, o.rig)), key=lambda o: o.rig)
+    if only:
+        known = [row for row in known if row["session"] == only]
+    olds = (old_of(row, cut_off=bool(only)) for row in known)
+    old = sorted((o for o in olds if o and rig in (None, o.rig)), key=lambda o: o.rig)
     done.undated = sorted(one.session for one in old if one.ended < _DATED)
     old = [one for one in old if one.ended >= _DATED]
     for _, of_rig in groupby(old, key=lambda one: one.rig):
@@ -124,9 +135,15 @@ def _is_same(entry: Entry | None, row: Row) -> bool:
     return entry is not None and entry.stamp == row["stamp"]
 
 
-def _old(row: Row) -> Old | None:
-    """A session that may be removed; one that is damaged may hide an alarm."""
-    if row["status"] in _STAYS or row["end"] is None:
+def old_of(row: Row, *, cut_off: bool = False) -> Old | None:
+    """A session that may be removed; one that is damaged may hide an alarm.
+
+    Args:
+        row: of the catalogue.
+        cut_off: an unfinished session is not recorded any more.
+    """
+    stays = row["status"] in _STAYS and not (cut_off and row["status"] == UNFINISHED)
+    if stays or row["end"] is None:
         return None
     ended = row["end"].replace(tzinfo=UTC).timestamp()
     alarms = bool(row["raised"]) or bool(row["damaged_bytes"])

@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Callable
 
-from rigwatch.witness.connections import Connections
+from rigwatch.witness.addresses.connections import Connections
 
 MOST_HUNG = 4
 """Calls that may hang at the same time; further ones fail at once."""

@@ -1,0 +1,134 @@
+"""Keeps files that this version has written, which all later versions have to read.
+
+    rigwatch demo ──▶ its folder ──▶ tests/versions/DAY/ rig.toml, model.toml, session.mcap,
+                                positions, alarms.jsonl with its position, rigwatch-index/, left.toml
+
+`python -m tools.keep_version` runs the demonstration, about two minutes; with the folder of one
+that this version has run, it takes that. Of the session stay two seconds after friction was named,
+and the folder is renamed to /var/lib/rig. `left.toml` says what was read of the files when they
+were kept; `tests/versions` compares it with what is read of them now.
+"""
+
+import hashlib
+import subprocess
+import sys
+import tempfile
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from shutil import copy
+from typing import Any
+
+from monitor.alarms import AlarmManager, read_journal
+from monitor.process.cursor import Cursor
+from rigwatch.archive import Store, index
+from rigwatch.recorder import load_positions, newest
+from rigwatch.wire.rig_config import load_rig
+from rigwatch.wire.session import Session, open_session, trim
+from rigwatch.wire.session.edit import copy_messages
+from rigwatch.wire.typed_files import as_toml
+
+VERSIONS = Path(__file__).parents[1] / "tests" / "versions"
+PLACE = "/var/lib/rig"
+AFTER, LENGTH = 256, 588
+"""The part of the session that is kept: samples from the naming of friction on, and how many."""
+FRICTION = "dry_friction"
+FILES = ("model.toml", "alarms.jsonl", "alarms.jsonl.position")
+
+
+def main() -> int:
+    """0 if the files are kept."""
+    if sys.argv[1:]:
+        print(keep(Path(sys.argv[1]), VERSIONS))
+        return 0
+    with tempfile.TemporaryDirectory() as folder:
+        words = [sys.executable, "-m", "rigwatch", "demo", "--headless", "--folder", folder]
+        done = subprocess.run(words, check=False)
+        if done.returncode == 0:
+            print(keep(Path(folder), VERSIONS))
+        return done.returncode
+
+
+def keep(demo: Path, versions: Path) -> Path:
+    """Keep the files of a demonstration.
+
+    Args:
+        demo: its folder.
+        versions: folder of the kept versions.
+
+    Returns:
+        the new folder, named by the day of the recording.
+
+    Raises:
+        FileExistsError: that day has one.
+        RigwatchError: the demonstration's files cannot be read.
+    """
+    config = load_rig(demo / "rig.toml")
+    assert config.recorder is not None
+    written = str(Path(config.recorder.folder).parent)  # as the configuration spells the folder
+    text = (demo / "rig.toml").read_text("utf-8").replace(f'"{written}/', f'"{PLACE}/')
+    session = open_session(newest(demo / "sessions", config.rig.id))
+    day = datetime.fromtimestamp(session.info.t_ns / 1e9, UTC).strftime("%Y-%m-%d")
+    target = versions / day
+    target.mkdir()
+    (target / "rig.toml").write_text(text, "utf-8")
+    for name in FILES:
+        copy(demo / name, target)
+    copy(session.path / "positions", target)
+    _keep_session(session, text, target / "session.mcap")
+    index(Store(str(target)))
+    (target / "rigwatch-index" / "lock").unlink(missing_ok=True)
+    (target / "left.toml").write_text(as_toml(left_in(target)), "utf-8")
+    return target
+
+
+def _keep_session(session: Session, configuration: str, target: Path) -> None:
+    """The part after friction was named, with the configuration that is kept beside it."""
+    alarms = (item.message for item in session.messages(["alarms"]))
+    named = next(one for one in alarms if one.name == FRICTION)
+    times = [
+        int(t_ns)
+        for block in session.samples()
+        for seq, t_ns in zip(range(block.seq, block.seq + len(block)), block.t_ns, strict=True)
+        if named.seq + AFTER <= seq <= named.seq + AFTER + LENGTH
+    ]
+    with tempfile.TemporaryDirectory() as folder:
+        trim(session, Path(folder, "part.mcap"), times[0], times[-1])
+        part = open_session(Path(folder, "part.mcap"))
+        sha256 = hashlib.sha256(configuration.encode()).hexdigest()
+        run = replace(part.info, configuration=configuration, configuration_sha256=sha256)
+        copy_messages(part.messages(), run, target)
+
+
+def left_in(version: Path) -> dict[str, Any]:
+    """What is read of a kept version's files.
+
+    Args:
+        version: its folder.
+
+    Returns:
+        `software` that wrote the session; its `samples` and `estimates`; `friction`, the state of
+        the friction alarm in the journal; `position`, the number of the monitor's last sample;
+        `recorded`, that of the recorder's last message of estimates, where it is kept.
+    """
+    session = open_session(version / "session.mcap")
+    records, _ = read_journal(version / "alarms.jsonl")
+    manager = AlarmManager()
+    manager.restore(list({record.alarm.name: record for record in records}.values()))
+    states = {alarm.name: alarm.state for alarm in manager.standing()}
+    with tempfile.TemporaryDirectory() as folder:
+        # A monitor maps its own file, and may write it.
+        place = Cursor(Path(copy(version / "alarms.jsonl.position", folder))).read()
+    kept = load_positions(version).get("estimates", {}).get("monitor")
+    return {
+        "software": session.info.software,
+        "samples": sum(map(len, session.samples())),
+        "estimates": sum(map(len, session.estimates())),
+        "friction": states.get(FRICTION, "normal"),
+        "position": -1 if place is None else place[1],
+        **({"recorded": kept[1]} if kept else {}),
+    }
+
+
+if __name__ == "__main__":
+    sys.exit(main())
