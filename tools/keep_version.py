@@ -1,7 +1,7 @@
 """Keeps files that this version has written, which all later versions have to read.
 
     rigwatch demo ──▶ its folder ──▶ tests/versions/DAY/ rig.toml, model.toml, session.mcap,
-                                positions, alarms.jsonl with its position, rigwatch-index/, left.toml
+                              positions, alarms.jsonl with its position, rigwatch-index/, left.toml
 
 `python -m tools.keep_version` runs the demonstration, about two minutes; with the folder of one
 that this version has run, it takes that. Of the session stay two seconds after friction was named,

@@ -9,6 +9,7 @@ import logging
 import os
 import select
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import serial
@@ -34,6 +35,8 @@ _CODES = {
     11: "gateway: the unit does not answer",
 }
 _REPEATABLE = (5, 6)
+_ALL_OBJECTS, _MOST_ANSWERS = 3, 8
+"""Read code for basic, regular and extended objects; answers over which they may be divided."""
 
 
 class PymodbusRegisters:
@@ -84,6 +87,39 @@ class PymodbusRegisters:
         self._check(reply, count)
         return list(reply.registers)
 
+    def identification(self) -> str:
+        """The texts by which the device identifies itself (function 43/14), in order.
+
+        Raises:
+            ModbusError: no valid answer, or the device has no identification.
+        """
+        found: dict[int, str] = {}
+        first = 0
+        for _ in range(_MOST_ANSWERS):
+            try:
+                reply = self._client.read_device_information(
+                    read_code=_ALL_OBJECTS, object_id=first, device_id=self._unit
+                )
+            except Exception as error:
+                raise ModbusError(f"{self._where}: no identification in time") from error
+            if reply.isError():
+                raise RefusedError(f"{self._where}: the device has no identification (43/14)")
+            found |= {number: _as_text(text) for number, text in reply.information.items()}
+            if not reply.more_follows or reply.next_object_id <= first:
+                break
+            first = reply.next_object_id
+        return ", ".join(found[number] for number in sorted(found) if found[number])
+
+    def check_identity(self, wanted: str) -> None:
+        """Check that the device's identification has the text `wanted`; "" for any device.
+
+        Raises:
+            RefusedError: it has not, or there is none.
+            ModbusError: no valid answer.
+        """
+        if wanted and wanted not in (found := self.identification()):
+            raise RefusedError(f"{self._where}: another device, {found!r}, expected {wanted!r}")
+
     def close(self) -> None:
         """Close the connection."""
         if self._client is not None:
@@ -99,6 +135,11 @@ class PymodbusRegisters:
         if len(reply.registers) != count:
             found = f"a reply of {len(reply.registers)} registers"
             raise ModbusError(f"{self._where}: {found}, expected {count}")
+
+
+def _as_text(value: bytes | list[bytes]) -> str:
+    parts = value if isinstance(value, list) else [value]
+    return " ".join(part.decode("utf-8", "replace") for part in parts).strip()
 
 
 class _RtuClient(ModbusSerialClient):
@@ -140,8 +181,7 @@ def tcp(section: ModbusSection, channels: tuple[ChannelSection, ...]) -> ModbusA
             raise DeviceError(f"{where}: no answer")
         return client
 
-    registers = PymodbusRegisters(make, section.unit, where)
-    return ModbusAdapter(registers, len(channels), section.polls, section.word_order)
+    return _adapter(PymodbusRegisters(make, section.unit, where), section, len(channels))
 
 
 def rtu(section: ModbusRtuSection, channels: tuple[ChannelSection, ...]) -> ModbusAdapter:
@@ -157,4 +197,11 @@ def rtu(section: ModbusRtuSection, channels: tuple[ChannelSection, ...]) -> Modb
     registers = PymodbusRegisters(
         lambda: first_that_opens(section.port, opened), section.unit, section.port
     )
-    return ModbusAdapter(registers, len(channels), section.polls, section.word_order)
+    return _adapter(registers, section, len(channels))
+
+
+def _adapter(
+    registers: PymodbusRegisters, section: ModbusSection | ModbusRtuSection, channels: int
+) -> ModbusAdapter:
+    check = partial(registers.check_identity, section.identity)
+    return ModbusAdapter(registers, channels, section.polls, section.word_order, check=check)

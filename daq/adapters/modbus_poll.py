@@ -49,6 +49,8 @@ class ModbusAdapter:
         channels: number of channels it must have.
         polls: polls per second.
         order: which 16-bit half of a 32-bit value comes first.
+        check: called when the device is connected and when it has started anew; raises
+            `RefusedError` if it is another one.
         clock: monotonic time [ns].
         sleep: waits for a number of seconds.
 
@@ -65,6 +67,7 @@ class ModbusAdapter:
         polls: float = 32.0,
         order: WordOrder = "big",
         *,
+        check: Callable[[], None] = lambda: None,
         clock: Callable[[], int] = time.monotonic_ns,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
@@ -72,6 +75,7 @@ class ModbusAdapter:
         self._channels = channels
         self._period_ns = round(1e9 / polls)
         self._order: WordOrder = order
+        self._check = check
         self._clock = clock
         self._sleep = sleep
         self._next_poll = 0
@@ -93,6 +97,7 @@ class ModbusAdapter:
         self._failed = 0
         self._next_poll = self._clock()
         self._header()
+        self._check()
 
     def read(self, timeout: float) -> Sequence[RawBlock]:
         """The new samples at the next poll, if it is due within `timeout` [s].
@@ -146,6 +151,8 @@ class ModbusAdapter:
     def _poll(self, blocks: list[RawBlock]) -> None:
         """Read the new samples into `blocks`, which has those read so far if it fails."""
         header = self._header()
+        if self._boot not in (None, header.boot):
+            self._check()  # on a line that stays open another device may answer now
         new = self._new(header)
         arrived = self._clock()
         while new > 0:

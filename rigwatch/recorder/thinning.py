@@ -8,6 +8,7 @@ them: together they take less than a quarter of a core, however much has to be t
 
 import json
 import os
+import random
 import subprocess
 import sys
 from pathlib import Path
@@ -20,7 +21,10 @@ from rigwatch.wire.rig_config import RecorderSection
 
 SOURCE = "recorder"
 EVERY = 3600.0
-"""Time from a look that found nothing to thin, or failed, to the next [s]."""
+"""Time from a look that found nothing to thin to the next [s]."""
+AGAIN = 60.0, 600.0
+"""Least and longest time from one that failed to the next [s]; drawn, as rigs that share a folder
+write one index in turns."""
 PAUSE, RESTS = 60.0, 3.0
 """Pause after a session that was thinned: at least so long [s], and so many times as it took."""
 FIRST = 60.0
@@ -92,6 +96,7 @@ class Thinning:
         session, failures = done.get("session", ""), done.get("failures", [])
         self._due = now + (max(PAUSE, RESTS * (now - self._began)) if session else EVERY)
         if not session and (code or failures):
+            self._due = now + random.uniform(*AGAIN)
             return self._failed((failures or words or [f"exit code {code}"])[-1], t_ns)
         self._trouble = self._told = ""
         if not session:

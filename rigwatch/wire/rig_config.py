@@ -120,6 +120,16 @@ WordOrder = Annotated[
 ReplyTime = Annotated[float, Meta(gt=0, description="time a reply may take [s]")]
 
 
+Identification = Annotated[
+    str,
+    Meta(
+        description="text, such as a serial number, that the device must have in its "
+        "identification (function 43/14); of another device no sample is taken; empty for any "
+        "device"
+    ),
+]
+
+
 class ModbusSection(Section, frozen=True, tag="modbus-tcp", tag_field="adapter"):
     """[daq.device] adapter = "modbus-tcp" — blocks of buffered samples polled over TCP."""
 
@@ -129,6 +139,7 @@ class ModbusSection(Section, frozen=True, tag="modbus-tcp", tag_field="adapter")
     polls: Polls = 32.0
     word_order: WordOrder = "big"
     timeout: ReplyTime = 0.3
+    identity: Identification = ""
 
 
 class ModbusRtuSection(Section, frozen=True, tag="modbus-rtu", tag_field="adapter"):
@@ -140,6 +151,7 @@ class ModbusRtuSection(Section, frozen=True, tag="modbus-rtu", tag_field="adapte
     polls: Polls = 32.0
     word_order: WordOrder = "big"
     timeout: ReplyTime = 0.3
+    identity: Identification = ""
 
 
 class ReplaySection(Section, frozen=True, tag="replay", tag_field="adapter"):

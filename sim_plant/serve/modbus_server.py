@@ -9,6 +9,7 @@ from typing import Any
 
 from pymodbus import FramerType
 from pymodbus.constants import ExcCodes
+from pymodbus.pdu.device import ModbusDeviceIdentification
 from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
@@ -35,6 +36,7 @@ class ModbusServer:
         rate: sample rate [Hz].
         trace: called with every packet (sending, bytes), and may change it, for line faults.
         heartbeat: called with the number of samples taken.
+        identity: its identification, which a process has one of.
 
     Attributes:
         exception: exception code in every answer, 0 for none.
@@ -48,12 +50,16 @@ class ModbusServer:
         *,
         trace: TracePacket | None = None,
         heartbeat: Heartbeat | None = None,
+        identity: str = "",
     ) -> None:
         self.device = device
         self.exception: int = 0
         self._bank = bank
         self._rate = rate
         self._trace = trace
+        names = {"VendorName": "rigwatch", "ProductCode": "simulated rig", "ModelName": identity}
+        identified: Any = ModbusDeviceIdentification  # pymodbus leaves it untyped
+        self._identity = identified(info_name=names) if identity else None
         self._heartbeat = heartbeat or Heartbeat("plant", {})
 
     def run_tcp(self, host: str, port: int, stop: threading.Event) -> None:
@@ -108,11 +114,17 @@ class ModbusServer:
         return None
 
     def _tcp(self, host: str, port: int) -> ModbusTcpServer:
-        return ModbusTcpServer(self._sim_device(), address=(host, port), trace_packet=self._trace)
+        return ModbusTcpServer(
+            self._sim_device(),
+            identity=self._identity,
+            address=(host, port),
+            trace_packet=self._trace,
+        )
 
     def _rtu(self, port: str) -> ModbusSerialServer:
         return ModbusSerialServer(
             self._sim_device(),
+            identity=self._identity,
             framer=FramerType.RTU,
             port=port,
             baudrate=BAUD,

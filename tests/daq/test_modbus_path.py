@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from daq.adapters import adapter_for
-from daq.adapters.modbus_poll import ModbusAdapter
+from daq.adapters.modbus_poll import ModbusAdapter, RefusedError
+from rigwatch.wire.errors import DeviceError, ModbusError
 from rigwatch.wire.host.ports import free_port
 from sim_plant.serve.modbus_server import ModbusServer
 from sim_plant.serve.pty_bridge import PtyBridge
@@ -22,6 +23,7 @@ from tests.daq.rig import (
     config_of,
     in_thread,
 )
+from tests.waiting import eventually
 
 Served = tuple[str, Callable[..., None]]
 
@@ -35,6 +37,36 @@ def served_tcp(server: ModbusServer, _folder: Path) -> Served:
 def served_rtu(server: ModbusServer, folder: Path) -> Served:
     device = f'adapter = "modbus-rtu"\nport = "{folder / "rtu"}"'
     return device, lambda stop: server.run_rtu(PtyBridge(folder / "rtu"), stop)
+
+
+@pytest.mark.parametrize("served", [served_tcp, served_rtu])
+def test_of_another_device_no_sample_is_taken(
+    served: Callable[[ModbusServer, Path], Served], tmp_path: Path
+) -> None:
+    server = ModbusServer(Device(ToySource()), RegisterBank(3), identity="RX-2 no. 4711")
+    section, serve = served(server, tmp_path)
+
+    def opened(identity: str) -> ModbusAdapter:
+        config = config_of(f'{section}\nidentity = "{identity}"')
+        adapter = adapter_for(config.daq.device, config.channels)
+        assert isinstance(adapter, ModbusAdapter)
+        eventually(lambda: is_there(adapter), "the device")
+        return adapter
+
+    def is_there(adapter: ModbusAdapter) -> bool:
+        try:
+            adapter.open()
+        except RefusedError:
+            adapter.close()
+            raise
+        except (DeviceError, ModbusError):
+            return False
+        return True
+
+    with in_thread(serve):
+        opened("4711").close()
+        with pytest.raises(RefusedError, match=r"another device, 'rigwatch, simulated rig, .*4711"):
+            opened("no. 4712")
 
 
 @pytest.mark.parametrize("served", [served_tcp, served_rtu])
@@ -93,3 +125,24 @@ def test_what_the_ring_has_lost_is_counted_exactly() -> None:
     numbers = [seq for _, seq in heard.numbers()]
     assert len(numbers) + heard.lost() == numbers[-1] - numbers[0] + 1
     assert heard.lost() == 2000 - (512 - 8)
+
+
+def test_a_device_that_takes_another_s_place_on_an_open_line_is_checked() -> None:
+    first, second = Device(ToySource()), Device(ToySource())
+    banks = RegisterBank(3), RegisterBank(3)
+    for device, bank in zip((first, second), banks, strict=True):
+        bank.add(device.advance(10))
+    time, asked = HostTime(), list[int]()
+    registers = BankRegisters(banks[0])
+    adapter = ModbusAdapter(
+        registers, 3, clock=time, sleep=time.pass_by, check=lambda: asked.append(1)
+    )
+    adapter.open()
+    for _ in range(3):
+        time.pass_by(1 / 32)
+        adapter.read(1.0)
+    assert len(asked) == 1
+    registers.read = banks[1].read
+    time.pass_by(1 / 32)
+    assert {block.boot for block in adapter.read(1.0)} == {second.boot} != {first.boot}
+    assert len(asked) == 2
