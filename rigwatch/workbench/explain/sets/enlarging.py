@@ -26,6 +26,8 @@ from rigwatch.workbench.ranking import (
     scored,
 )
 
+_ON_PART: WeakKeyDictionary[Fitted, float] = WeakKeyDictionary()
+"""Errors of fits on the part of the training; a fit belongs to one study."""
 _SCORED: WeakKeyDictionary[Fitted, list[Ranked]] = WeakKeyDictionary()
 """Scores of all effects by the fit they were scored along; sets share the fits of their parts."""
 
@@ -87,12 +89,14 @@ def most_promising(bench: Bench, waiting: Sequence[Larger]) -> list[Larger]:
 
 
 def error_on_part(bench: Bench, known: Combination) -> float:
-    """Error of a set on a part of the training; infinite if it is not known."""
-    part = part_of(bench)
-    try:
-        return part.error(known.fitted) if part else math.inf
-    except ModelError:
-        return math.inf
+    """Error of a set on a part of the training, computed once; infinite if it is not known."""
+    if known.fitted not in _ON_PART:
+        part = part_of(bench)
+        try:
+            _ON_PART[known.fitted] = part.error(known.fitted) if part else math.inf
+        except ModelError:
+            _ON_PART[known.fitted] = math.inf
+    return _ON_PART[known.fitted]
 
 
 def all_fitted(bench: Bench, larger: Sequence[Larger]) -> list[Combination]:
