@@ -173,6 +173,14 @@ def seems_to_grow(kept: FloatArray) -> bool:
 
 
 @part()
+def seems_late(kept: FloatArray) -> bool:
+    """Whether a lateness, and not dry friction, explains the newest samples: a clock may slip."""
+    left = _left(_best(kept, OF_QUICK), kept, OF_QUICK)
+    most = left < MOST_OF_IT * kept[OF_QUICK + ERRORS]
+    return most and RATHER * left < _rubbing(kept, OF_QUICK)
+
+
+@part()
 def rubs(kept: FloatArray) -> bool:
     """Whether dry friction explains the newest samples better than any lateness does."""
     return _rubbing(kept, OF_QUICK) < _left(_best(kept, OF_QUICK), kept, OF_QUICK)

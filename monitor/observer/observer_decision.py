@@ -68,6 +68,7 @@ from monitor.observer.input_lateness import (
     is_late,
     lateness_changes,
     rubs,
+    seems_late,
     seems_to_grow,
     slides,
     unsure_lateness,
@@ -116,9 +117,10 @@ OVER = 256
 """Samples without a departure after which an episode ends."""
 VIOLATED = 16
 """Consecutive samples in which the sensors must disagree."""
-SURE, REMAINS = 2.0, 128
-"""Ratio to the limit above which a deviation is a departure at once, and samples after which a
-smaller one is: transients of a drive change are small or short.
+SURE, SURELY_NEW, REMAINS = 2.0, 1.25, 128
+"""Ratio to the limit above which a deviation is a departure at once; the same for a residual that
+is compared with what a healthy rig left at this very motion; and samples after which a smaller one
+is a departure: transients of a drive change are small or short.
 """
 SUDDEN, LATE, BEFORE = 8.0, 16.0, 256.0
 """Ratio of the drive's energy over `LATE` samples to that over `BEFORE` above which the drive has
@@ -306,7 +308,8 @@ def _one(  # noqa: PLR0917 -- a kernel
     count[QUIET] = 0 if away else count[QUIET] + 1
     count[ABOVE] = count[ABOVE] + 1 if away else 0
     if count[ONSET] < 0:
-        away = count[ABOVE] >= REMAINS or _sure(out[DEVIATION, k], kept)
+        known = 0.0 if np.isinf(usual[USUAL_SHORT]) else largest
+        away = count[ABOVE] >= REMAINS or _sure(out[DEVIATION, k], known, kept)
     away = away or count[JUMP_AGO] == 0
     mode = _mode(kept, rules)
     out[MODE, k] = mode
@@ -319,14 +322,19 @@ def _one(  # noqa: PLR0917 -- a kernel
 
 
 @part()
-def _sure(deviation: float, kept: DecisionState) -> bool:
+def _sure(deviation: float, known: float, kept: DecisionState) -> bool:
     """Whether a deviation is a departure at once.
 
     Where steps that slide fall is not known of every input, and the lateness jumps by a sample.
+
+    Args:
+        deviation: the largest.
+        known: that of the residual from the healthy one at this very motion; 0 if it is not known.
+        kept: the state.
     """
     if is_late(kept.lateness):
         return kept.counts[ABOVE] >= MEDIUM and rubs(kept.lateness)
-    return deviation > SURE
+    return deviation > SURE or (known > SURELY_NEW and not seems_late(kept.lateness))
 
 
 @part()

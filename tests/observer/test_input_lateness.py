@@ -12,6 +12,7 @@ follow_lateness = from_python(input_lateness.follow_lateness)
 is_late = from_python(input_lateness.is_late)
 lateness_changes = from_python(input_lateness.lateness_changes)
 rubs = from_python(input_lateness.rubs)
+seems_late = from_python(input_lateness.seems_late)
 seems_to_grow = from_python(input_lateness.seems_to_grow)
 slides = from_python(input_lateness.slides)
 unsure_lateness = from_python(input_lateness.unsure_lateness)
@@ -176,3 +177,8 @@ def test_friction_is_no_lateness_that_changes() -> None:
         changes.append(lateness_changes(kept))
 
     assert not any(changes[round(SLOW) :])
+
+
+def test_most_of_a_slipped_clocks_residual_is_a_lateness_and_most_of_frictions_is_not() -> None:
+    assert seems_late(learnt(0.5 * LATE))
+    assert not seems_late(learnt(0.3 * DRY))

@@ -10,7 +10,7 @@ from monitor.model import EquationsPlant
 from monitor.observer import E, Observed, ObserverSignals, decide, friction_limit, new_state
 from monitor.observer import decision_state as d
 from monitor.observer.lagged_motion import FIRST, WHOLE
-from monitor.observer.missing_force import JUDGED
+from monitor.observer.missing_force import JUDGED, LATE_UNIT
 from monitor.signals import GOOD, NEW_BOOT
 from tests.monitor.observed_rig import RATE, SINE, UNITS, model, run
 
@@ -67,3 +67,32 @@ def test_limits_grow_only_where_the_motion_was_not_recorded(usual: float, ratio:
         assert friction_limit(np.array([np.inf, 1.0]), rules)[1] == pytest.approx(1.6)
 
     assert deviations[1] == pytest.approx(deviations[0] * np.sqrt(ratio))
+
+
+@pytest.mark.parametrize(
+    ("usual", "late", "soonest", "latest"),
+    [(1.0, 0.0, 4, 12), (np.inf, 0.0, 120, 140), (1.0, 2.0, 120, np.inf)],
+    ids=["known", "unknown", "a lateness explains it"],
+)
+def test_a_new_residual_at_a_motion_that_is_known_is_a_departure_at_once(
+    usual: float, late: float, soonest: float, latest: float
+) -> None:
+    n, begin, size = 1024, 768, 0.115
+    judged, levels, zeros = np.zeros((n, JUDGED)), np.zeros((n, 1)), np.zeros(n, np.bool_)
+    judged[:, E] = 0.03 * np.random.default_rng(1).standard_normal(n)
+    judged[begin:, E] += size
+    judged[begin:, LATE_UNIT] = size * late
+    state = np.full(n, WHOLE)
+    state[0] = FIRST
+    out = np.zeros((len(d.OUTPUTS), n))
+    # Limits are the same whether the motion is known or not.
+    rules = RULES._replace(short=2.56, medium=2.56, unseen=1.0)
+    decide(
+        judged, np.ones(n), levels, np.ones(n), ~zeros, zeros, ~zeros,
+        np.full((4, n), usual), np.zeros(n), state, rules, new_state(1), out,
+    )  # fmt: skip
+
+    departed = np.flatnonzero(out[d.DEPARTED])
+    first = departed[0] - begin if departed.size else np.inf
+    assert soonest <= first <= latest
+    assert out[d.DEVIATION, begin : begin + 100].max() < 2.0
