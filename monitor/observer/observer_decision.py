@@ -308,7 +308,8 @@ def _one(  # noqa: PLR0917 -- a kernel
     count[QUIET] = 0 if away else count[QUIET] + 1
     count[ABOVE] = count[ABOVE] + 1 if away else 0
     if count[ONSET] < 0:
-        known = 0.0 if np.isinf(usual[USUAL_SHORT]) else largest
+        exact = mean_square(kept, LATENESS, MEDIUM) + mean_square(kept, UNDECIDED, MEDIUM) == 0.0
+        known = 0.0 if np.isinf(usual[USUAL_SHORT]) or not exact else largest
         away = count[ABOVE] >= REMAINS or _sure(out[DEVIATION, k], known, kept)
     away = away or count[JUMP_AGO] == 0
     mode = _mode(kept, rules)
@@ -329,7 +330,8 @@ def _sure(deviation: float, known: float, kept: DecisionState) -> bool:
 
     Args:
         deviation: the largest.
-        known: that of the residual from the healthy one at this very motion; 0 if it is not known.
+        known: that of the residual from the healthy one at this very motion; 0 if that or the
+            instants of the inputs are not known.
         kept: the state.
     """
     if is_late(kept.lateness):
