@@ -150,11 +150,9 @@ class Narrator:
         if alarm.name not in told:
             self._say(f"            what to do: {alarm.guidance_for(self._config)}")
         if self._attended and alarm.name != NAMELESS and told <= {NAMELESS}:
-            self._say(
-                f"            all alarms: $ rigwatch alarms {self._config}\n"
-                "            (an alarm is kept, even once its cause has gone, until somebody\n"
-                "            has said that it was seen: rigwatch ack)"
-            )
+            self._say(f"            all alarms: $ rigwatch alarms {self._config}")
+            self._say("            (an alarm is kept, even once its cause has gone, until somebody")
+            self._say("            has said that it was seen: rigwatch ack)")
 
     def explain(self, event: Event) -> None:
         """Report which effect the monitor finds to be missing in its model since an alarm."""
