@@ -62,15 +62,22 @@ class Sites:
     def wait(self, name: str, least: float, beyond: float | None = None) -> float:
         """A figure of the headquarters' recorder, once it is above `beyond`, or so much more."""
         beyond = self.figures.get(name, 0.0) + least if beyond is None else beyond
-
-        def there() -> bool:
-            for health in self.health.drain():
-                if isinstance(health, Health) and health.source == "headquarters":
-                    self.figures = dict(health.counters)
-            return self.figures.get(name, -2.0) > beyond
-
-        eventually(there, f"{name} of the headquarters above {beyond}")
+        eventually(
+            lambda: self._figure(name) > beyond, f"{name} of the headquarters above {beyond}"
+        )
         return self.figures[name]
+
+    def wait_filled(self) -> None:
+        """The headquarters' recorder has asked for what it missed, and has every answer."""
+        for name in ("filled_samples", "filled_estimates", "filled_messages"):
+            self.wait(name, 0, 0)
+        eventually(lambda: self._figure("filling") == 0.0, "all answers of the site's recordings")
+
+    def _figure(self, name: str) -> float:
+        for health in self.health.drain():
+            if isinstance(health, Health) and health.source == "headquarters":
+                self.figures = dict(health.counters)
+        return self.figures.get(name, -2.0)
 
     def cut(self) -> None:
         kill(self.proxy)
@@ -150,8 +157,7 @@ def test_what_was_missed_in_a_cut_comes_from_the_sites_recordings(sites: Sites) 
     sites.cut()
     sites.site_records(10 * RATE)
     sites.mend()
-    for name in ("filled_samples", "filled_estimates", "filled_messages"):
-        sites.wait(name, 0, 0)
+    sites.wait_filled()
     sites.wait("samples", 2 * RATE)
     assert_same(*sites.end())
 
@@ -169,7 +175,6 @@ def test_source_and_headquarters_start_anew_in_the_cut(sites: Sites) -> None:
     sites.figures = {}
     sites.start_far()
     sites.wait("samples", 7 * RATE)
-    for name in ("filled_samples", "filled_estimates", "filled_messages"):
-        sites.wait(name, 0, 0)
+    sites.wait_filled()
     sites.wait("samples", 2 * RATE)
     assert_same(*sites.end())
