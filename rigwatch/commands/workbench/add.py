@@ -56,23 +56,9 @@ def run(arguments: argparse.Namespace) -> int:
             return 0
     if arguments.effect is None:
         raise ModelError("add: found no effect, expected its name, or --effect-file")
-    effect, port = _placed(arguments.effect, arguments.port)
     change = add(
-        study, effect, port, anyway=arguments.anyway, beside=arguments.beside, progress=say
-    )
+        study, arguments.effect, arguments.port, anyway=arguments.anyway,
+        beside=arguments.beside, progress=say,
+    )  # fmt: skip
     print_result(arguments, change, change_lines(change))
     return 1 if change.step == "refused" else 0
-
-
-def _placed(effect: str, port: str | None) -> tuple[str, str | None]:
-    """Name of the effect and of its port, None if neither `effect@port` nor `--port` gives one.
-
-    Raises:
-        ModelError: they give two ports.
-    """
-    from rigwatch.wire.errors import ModelError
-
-    name, _, named = effect.partition("@")
-    if named and port and named != port:
-        raise ModelError(f"add: found {effect} with --port {port}, expected one port")
-    return name, named or port

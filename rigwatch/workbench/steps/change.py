@@ -33,7 +33,7 @@ def add(
 
     Args:
         study: the study.
-        effect: its name.
+        effect: its name, or "effect@port".
         port: name of the port; optional if only one port is compatible.
         anyway: add it even if the held-out error does not fall.
         beside: other effects, as "effect@port", that are missing as well: if it is refused alone,

@@ -115,7 +115,7 @@ def try_add(
         ModelError: effect or port is unknown or already there, or the fit fails.
     """
     warm = warm or Warm()
-    where = _port(study, effect, port)
+    effect, where = _placed(study, effect, port)
     others = _others(study, f"{effect}@{where}", beside)
     progress("fitting the current model")
     bench, before = warm.bench(study), warm.comparison(study)
@@ -151,8 +151,7 @@ def _others(study: Study, label: str, beside: Sequence[str]) -> list[str]:
     Raises:
         ModelError: one is unknown, in the model already, or named twice.
     """
-    names = [each.partition("@") for each in beside]
-    found = [f"{name}@{_port(study, name, port or None)}" for name, _, port in names]
+    found = ["@".join(_placed(study, each)) for each in beside]
     if len({label, *found}) <= len(found):
         raise ModelError(f"{label}: found with {' '.join(found)}, expected each effect once")
     return found
@@ -282,6 +281,18 @@ def _numbers(found: Comparison) -> dict[str, object]:
         "noise_floor": found.noise_floor,
         "unit": found.unit,
     }
+
+
+def _placed(study: Study, effect: str, port: str | None = None) -> tuple[str, str]:
+    """Name and port of `effect` or `effect@port`.
+
+    Raises:
+        ModelError: effect or port is unknown or already there, or two ports are given.
+    """
+    name, _, named = effect.partition("@")
+    if named and port and named != port:
+        raise ModelError(f"add: found {effect} with --port {port}, expected one port")
+    return name, _port(study, name, named or port)
 
 
 def _port(study: Study, name: str, port: str | None) -> str:

@@ -9,6 +9,7 @@ from rigwatch.workbench.compare.compare import compare
 from rigwatch.workbench.compare.horizon import with_horizon
 from rigwatch.workbench.explain.explain import explain
 from rigwatch.workbench.steps.change import add, undo
+from rigwatch.workbench.steps.study_stages import stages
 from rigwatch.workbench.study.study import Study, open_study
 from tests.workbench.machine import studied
 from tests.workbench.studies.test_own_model import PORT, SPEED, UNITS
@@ -223,3 +224,5 @@ def test_windows_grow_where_hidden_states_leave_a_fit_without_an_optimum(
     (said,) = [remark for remark in found.remarks if "horizon" in remark]
     assert "of the shortest recording: over a tenth the fit does not converge" in said
     assert "initial values of x1 stand in" in said
+    (alone,) = stages(study)
+    assert alone.comparison.held_out_error == found.held_out_error
