@@ -24,7 +24,14 @@ from rigwatch.recorder.store import Store
 from rigwatch.recorder.thinning import Thinning
 from rigwatch.wire.bus import Bus, joined
 from rigwatch.wire.errors import SessionError
-from rigwatch.wire.host import Heartbeat, Kept, Pulse, free_share, use_few_pools
+from rigwatch.wire.host import (
+    Heartbeat,
+    Kept,
+    Pulse,
+    free_share,
+    settle_memory,
+    use_few_pools,
+)
 from rigwatch.wire.messages import (
     ALARMS,
     ESTIMATES,
@@ -173,6 +180,7 @@ def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event, pul
     try:
         recorder = Recorder(config, run, bus)
         pulse.ready(f"recording to {recorder.store.folder}")
+        settle_memory()
         try:
             while not stop.wait(recorder.settings.flush * _OF_FLUSH):
                 kept.check()

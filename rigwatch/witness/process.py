@@ -20,7 +20,7 @@ from rigwatch.wire.bus import (
     serve_alarm_list,
 )
 from rigwatch.wire.errors import BusError
-from rigwatch.wire.host import Heartbeat, use_few_pools
+from rigwatch.wire.host import Heartbeat, settle_memory, use_few_pools
 from rigwatch.wire.messages import (
     ALARMS,
     COMMANDS,
@@ -184,6 +184,7 @@ def run(config: RigConfig, stop: threading.Event) -> None:
             patient(config), bus, time.monotonic(), config.bus.security, beside_journal(config)
         )
         heartbeat = Heartbeat(PROCESS)
+        settle_memory()
         heartbeat.ready()
         turns = 0
         while not stop.wait(TURN):

@@ -3,10 +3,14 @@
 The C library gives each thread a pool of its own, sixteen in a process on the bus, and each grows
 to the most that its threads ever needed at a time. A large piece freed once also makes it take
 later ones from the pools, which they leave full of holes.
+
+Python looks for cycles among old objects only once a quarter as many new ones wait, and start-up
+makes forty thousand: garbage of months would wait for that, in arenas that are never given back.
 """
 
 import contextlib
 import ctypes
+import gc
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8
 """Options of mallopt(3)."""
@@ -25,3 +29,13 @@ def use_few_pools() -> None:
             (_TRIM_THRESHOLD, LARGE),
         ):
             mallopt(option, value)
+
+
+def settle_memory() -> None:
+    """Collect what start-up has left; call it once, after all set-up, before the loop.
+
+    Objects that exist now are never examined again, so that later collections are short and come
+    as often as new garbage asks for.
+    """
+    gc.collect()
+    gc.freeze()

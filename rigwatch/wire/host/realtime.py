@@ -5,6 +5,8 @@ import gc
 import os
 import sys
 
+from rigwatch.wire.host.few_pools import settle_memory
+
 SWITCH_INTERVAL = 0.0005
 """Longest wait of a thread for the interpreter lock [s]."""
 
@@ -40,12 +42,11 @@ def be_idle() -> None:
 
 
 def prepare_for_real_time() -> None:
-    """Tune the garbage collector; call it once, after all set-up, before the loop.
+    """Settle the memory and tune the garbage collector; call it once, before the loop.
 
-    Objects that exist now are never examined again, and collections of the old generations become
-    rare: they pause the whole process, for longer the more objects there are.
+    Collections of the old generations become rare: they pause the whole process, for longer the
+    more objects there are.
     """
     sys.setswitchinterval(SWITCH_INTERVAL)
-    gc.collect()
-    gc.freeze()
+    settle_memory()
     gc.set_threshold(10_000, 50, 1000)

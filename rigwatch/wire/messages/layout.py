@@ -36,7 +36,7 @@ class Layout:
         device: offsets of the device's name, None for an empty one.
         boot, seq: offsets of these numbers, None for 0.
         times: offsets of its integer arrays.
-        fixed: all other bytes, with their offsets.
+        fixed: all other bytes, each part with its offset.
     """
 
     samples: int
@@ -45,7 +45,7 @@ class Layout:
     seq: Span | None
     times: tuple[int, ...]
     columns: tuple[ColumnPlace, ...]
-    fixed: tuple[tuple[int, int, bytes], ...]
+    fixed: tuple[tuple[int, bytes], ...]
 
     @cached_property
     def names(self) -> tuple[tuple[str, str, bool], ...]:

@@ -84,7 +84,7 @@ def _fits(layout: Layout, data: bytes) -> bool:
     for span in (layout.boot, layout.seq):
         if span is not None and filling(data[span[0] : span[1]]) is None:
             return False
-    for start, _, part in layout.fixed:  # noqa: SIM110 (a generator takes longer)
+    for start, part in layout.fixed:  # noqa: SIM110 (a generator takes longer)
         if not data.startswith(part, start):
             return False
     return True
@@ -142,10 +142,10 @@ def _column(data: bytes, span: Span, n: int) -> ColumnPlace:
     return ColumnPlace(name, unit, values[0], quality[0])
 
 
-def _between(data: bytes, variable: list[Span]) -> tuple[tuple[int, int, bytes], ...]:
+def _between(data: bytes, variable: list[Span]) -> tuple[tuple[int, bytes], ...]:
     starts = [0, *(stop for _, stop in variable)]
     stops = [*(start for start, _ in variable), len(data)]
-    return tuple((a, b, data[a:b]) for a, b in zip(starts, stops, strict=True))
+    return tuple((a, data[a:b]) for a, b in zip(starts, stops, strict=True))
 
 
 def _fields(data: bytes, within: Span, tags: Set[int]) -> dict[int, list[Span]]:
