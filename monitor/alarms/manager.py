@@ -116,6 +116,21 @@ class AlarmManager:
             self._set(name, at, active=active)
         return self._take_announcements()
 
+    def reword(self, name: str, text: str, t_ns: int) -> list[Announcement]:
+        """Announce an alarm again, in its state, whose condition now holds for another reason.
+
+        Args:
+            name: the alarm; nothing happens unless it stands and its condition holds.
+            text: the reason; nothing happens if it has been told.
+            t_ns: Unix time [ns].
+        """
+        self._advance(t_ns)
+        alarm = self._alarms.get(name)
+        if alarm and alarm.active and alarm.state != "normal" and alarm.occasion.text != text:
+            alarm.occasion = replace(alarm.occasion, text=text)
+            self._publish(alarm, t_ns)
+        return self._take_announcements()
+
     def pass_to(self, t_ns: int) -> list[Announcement]:
         """Process what is due by `t_ns` [ns], such as the end of a shelving."""
         self._advance(t_ns)

@@ -229,12 +229,23 @@ def in_words(rows: Sequence[Suspect]) -> str:
     best = rows[0]
     if best.explained < EXPLAINED:
         return f"probably missing: no known effect; the nearest is {_fit(best)}"
-    text = f"probably missing: {_fit(best)}"
+    return f"probably missing: {_fit(best)}{_rivals(best, rows)}"
+
+
+def _rivals(best: Suspect, rows: Sequence[Suspect]) -> str:
+    """What explains the same as the best: other laws of one effect, or other effects as well."""
     if not best.alike:
-        return text
+        return ""
+    kin = {row.label for row in rows if (row.family, row.port) == (best.family, best.port)}
     named, more = best.alike[:6], len(best.alike) - 6
-    rest = f" and {more} more" if more > 0 else ""
-    return f"{text}; cannot be told from {', '.join(named)}{rest}"
+    listed = ", ".join(named) + (f" and {more} more" if more > 0 else "")
+    if not best.family or not kin.issuperset(best.alike):
+        return f"; cannot be told from {listed}"
+    verb = "explains" if len(best.alike) == 1 else "explain"
+    return (
+        f"; {best.family} at {best.port} is settled, by which law is not: "
+        f"{listed} {verb} as much, and neither alarm nor action depends on it"
+    )
 
 
 def _fit(row: Suspect) -> str:

@@ -14,6 +14,10 @@ LOSS_SHOWN_NS = 1_000_000_000
 """Time for which a loss alarm holds after the last gap [ns]."""
 DRIFT_PPM, WRONG_PPM = 500.0, 5000.0
 """Clock deviations of a device above which a warning and an error are raised [ppm]."""
+REASON_LASTS_NS = 2_000_000_000
+"""Time after which another reason of an absent device is told; attempts to open it fail in turn for
+several reasons [ns].
+"""
 UNJUDGED_S = 1.0
 """Time without an estimate, while samples arrive, after which an alarm is raised [s]."""
 ALMOST_FULL = 0.02
@@ -59,6 +63,7 @@ class LinkWatch:
         self._lost = 0
         self._lost_at_ns = -LOSS_SHOWN_NS
         self._clock_offset_ns: int | None = None
+        self._reason, self._reason_since_ns = "", 0
 
     def lost(self, samples: int, monotonic_ns: int) -> None:
         """Record lost samples; 0 for an unknown number."""
@@ -75,6 +80,13 @@ class LinkWatch:
         yield "duplicate_source", occasion(seen), seen.contested
         losing = seen.monotonic_ns - self._lost_at_ns < LOSS_SHOWN_NS
         yield "loss", occasion(seen, float(self._lost), 0.0, "samples lost so far"), losing
+
+    def lasting_reason(self, seen: Seen) -> str:
+        """Why no samples arrive, once it has been the same reason for a while; "" before."""
+        if seen.daq_trouble != self._reason:
+            self._reason, self._reason_since_ns = seen.daq_trouble, seen.monotonic_ns
+        lasts = seen.monotonic_ns - self._reason_since_ns >= REASON_LASTS_NS
+        return self._reason if lasts else ""
 
     def clock_step(self, seen: Seen) -> int:
         """Step of the wall clock since the last call [ns]; 0 if it was not set."""

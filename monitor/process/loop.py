@@ -162,6 +162,8 @@ class MonitorProcess:
             if self.rig.alarms.holds(name) != holds:
                 at = replace(occasion, t_ns=now_ns)
                 self.say(self.rig.alarms.report(name, at, active=holds))
+        if reason := self._links.lasting_reason(seen):
+            self.say(self.rig.alarms.reword("link", reason, now_ns))
         self._announce_router(seen)
         self._announce_clock_step(seen)
         if self._health.is_due(seen.monotonic_ns):

@@ -609,3 +609,21 @@ def test_nothing_stays_on_the_shelf_longer_than_a_shift_from_the_restart():
         new.restore(records[-1:], now_ns)
         assert new.report("loss", Occasion(t_ns=ends - 1), active=False) == []
         assert codes(new.report("loss", Occasion(t_ns=ends), active=False)) == ["alarm_unshelved"]
+
+
+def test_another_reason_of_a_standing_alarm_is_announced_once_in_its_state() -> None:
+    alarms = AlarmManager()
+    assert alarms.reword("link", "no answer", 1) == [], "nothing stands"
+    alarms.report("link", Occasion("rig", 7, 9, 10, text="no answer"), active=True)
+    assert alarms.reword("link", "no answer", 20) == [], "it has been told"
+    (said,) = alarms.reword("link", "another device", 30)
+    assert isinstance(said, Alarm)
+    assert (said.state, said.t_ns, said.seq) == ("unacknowledged", 30, 9)
+    assert said.cause.endswith(": another device")
+    assert alarms.take_changes()[-1].alarm == said, "the journal has it"
+    alarms.command(order("link", "acknowledge", at=40))
+    (seen,) = alarms.reword("link", "no answer", 50)
+    assert isinstance(seen, Alarm)
+    assert seen.state == "acknowledged"
+    alarms.report("link", Occasion("rig", 7, 9, 60), active=False)
+    assert alarms.reword("link", "another device", 70) == [], "its condition has gone"

@@ -99,6 +99,22 @@ def test_a_probability_is_told_as_once_in_so_many(p_value: float, words: str) ->
     assert ("cannot tell" in text) == (p_value > 0.01)
 
 
+def test_rivals_of_one_family_leave_the_kind_of_fault_without_doubt() -> None:
+    best = Suspect("coulomb", "load", 1e-9, 0.99, 1, "dry friction")
+    law = Suspect("bliman_sorine_2", "load", 1e-9, 0.99, 3, "dry friction")
+    leak = Suspect("leakage", "chambers", 1e-9, 0.99, 1, "leak")
+    elsewhere = replace(law, port="valve")
+    settled = in_words([replace(best, alike=(law.label,)), law])
+    assert "dry friction at load is settled, by which law is not: bliman_sorine_2@load" in settled
+    assert "cannot be told" not in settled
+    for other in (leak, elsewhere):
+        both = replace(best, alike=(law.label, other.label))
+        assert f"cannot be told from {law.label}, {other.label}" in in_words([both, law, other])
+    nameless = replace(law, family="")
+    alone = replace(best, family="", alike=(law.label,))
+    assert "cannot be told from" in in_words([alone, nameless]), "no family is none in common"
+
+
 def test_what_no_effect_explains_is_not_given_a_name() -> None:
     healthy = evidence()
     time_ = np.arange(len(healthy.change)) / RATE

@@ -405,6 +405,15 @@ def test_each_alarm_of_the_link_holds_as_long_as_its_reason() -> None:
     assert holding(watch, seen(4, 4)) == set()
 
 
+def test_a_reason_counts_once_it_has_lasted_and_attempts_that_fail_in_turn_do_not() -> None:
+    watch = LinkWatch(0.1)
+    reasons = [("", 0.0), ("no answer", 1.0), ("closed", 2.0), ("no answer", 3.0)]
+    assert not any(watch.lasting_reason(seen(t, t, trouble=why)) for why, t in reasons)
+    assert watch.lasting_reason(seen(4.9, 4.9, trouble="no answer")) == ""
+    assert watch.lasting_reason(seen(5.1, 5.1, trouble="no answer")) == "no answer"
+    assert watch.lasting_reason(seen(5.2, 5.2, trouble="another device")) == ""
+
+
 def test_a_clock_that_was_set_is_noticed_and_one_that_runs_is_not() -> None:
     watch = LinkWatch(0.1)
     assert [watch.clock_step(seen(t, t)) for t in (0, 1, 2)] == [0, 0, 0]
