@@ -13,9 +13,13 @@ Certain is only what shows from each eighth of the time to the next.
 
 A jump of the device's clock shows within one sample: its microseconds disagree with its sample
 numbers and with the host's clock.
+
+Samples along a line that is known, of a quarter second that has begun, are stamped by a compiled
+call; every other one is stamped alone.
 """
 
 from collections import deque
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +27,7 @@ from numpy.typing import NDArray
 from daq.adapter import RawBlock
 from rigwatch.wire.arrays import IntArray
 from rigwatch.wire.host import both_clocks
+from rigwatch.wire.kernel import kernel
 
 _BIN_US = 250_000
 _BINS = 240
@@ -35,6 +40,32 @@ _USUAL_DRIFT = 1e-3
 """Standard deviation of a drift that is not measured yet."""
 _JUMP_PERIODS = 2.5
 _WALL_STEP_NS = 500_000_000
+
+
+class _Line(NamedTuple):
+    """The line of `DeviceClock` from an anchor: device [µs], host's monotonic time [ns]."""
+
+    us0: int
+    ns0: int
+    unix_ns: int
+    ns_per_us: float
+    slope: float
+    centre: float
+    offset: float
+    period_us: float
+
+
+class _Place(NamedTuple):
+    """The last sample: number, device's clock [µs], stamp [ns]; and its quarter second: where it
+    ends after the anchor [µs], and where its least delayed sample lies [µs], late by so much [ns].
+    """
+
+    seq: int
+    us: int
+    ns: int
+    end: int
+    earliest: int
+    late: float
 
 
 class DeviceClock:
@@ -63,10 +94,14 @@ class DeviceClock:
         self._last_ns = 0
         self._last: tuple[int, int] | None = None
         self.restart()
+        nothing = np.zeros((3, 0), np.int64)
+        line = _Line(0, 0, 0, self._ns_per_us, 0.0, 0.0, 0.0, self._period_us)
+        # Compiled before the first sample arrives.
+        _stamp_along(nothing, 0, line, _Place(0, 0, 0, 0, 0, 0.0), nothing[0])
 
     def restart(self) -> None:
         """Forget the device's clock, as after a restart; time still only moves forward."""
-        self._bins: deque[tuple[float, float]] = deque(maxlen=_BINS)
+        self._bins: deque[tuple[int, float]] = deque(maxlen=_BINS)
         self._since_fit = 0
         self._anchor: tuple[int, int] | None = None
         self._slope, self._offset, self._centre = 0.0, 0.0, 0.0
@@ -77,19 +112,40 @@ class DeviceClock:
 
         `run` holds consecutive samples, unwrapped, of one boot.
         """
-        rows = zip(run.seq.tolist(), run.device_us.tolist(), run.arrived_ns.tolist(), strict=True)
-        stamps, jump = [], 0.0
-        for seq, us, arrived in rows:
-            jumped = self._jump(seq, us, arrived)
-            if jumped:
-                jump = jumped
-                self.jumps += 1
-                self.restart()
-            self._learn(us, arrived)
-            self._last = (seq, us)
-            self._last_ns = max(self._last_ns + 1, self._unix_ns + self._host_ns(us))
-            stamps.append(self._last_ns)
-        return np.array(stamps, np.int64), jump
+        samples, jump, at = np.empty((3, len(run)), np.int64), 0.0, 0
+        samples[0], samples[1], samples[2] = run.seq, run.device_us, run.arrived_ns
+        stamps = np.empty(len(run), np.int64)
+        while (at := self._stamp_along(samples, at, stamps)) < len(stamps):
+            jump = self._stamp_one(*samples[:, at].tolist()) or jump
+            stamps[at] = self._last_ns
+            at += 1
+        return stamps, jump
+
+    def _stamp_along(self, samples: IntArray, at: int, stamps: IntArray) -> int:
+        """Stamp samples from `at` on while they lie along the line; the first that does not."""
+        if self._anchor is None or self._last is None or len(self._bins) < _BINS_FOR_LINE:
+            return at
+        earliest, late = self._bins[-1]
+        end = earliest // _BIN_US * _BIN_US + _BIN_US
+        slope, centre, offset = self._slope, self._centre, self._offset
+        line = _Line(
+            *self._anchor, self._unix_ns, self._ns_per_us, slope, centre, offset, self._period_us
+        )
+        place = _Place(*self._last, self._last_ns, end, earliest, late)
+        at, seq, us, self._last_ns, earliest, late = _stamp_along(samples, at, line, place, stamps)
+        self._last, self._bins[-1] = (seq, us), (earliest, late)
+        return at
+
+    def _stamp_one(self, seq: int, us: int, arrived: int) -> float:
+        """Stamp one sample with `_last_ns`; the jump of the device's clock before it [s]."""
+        jumped = self._jump(seq, us, arrived)
+        if jumped:
+            self.jumps += 1
+            self.restart()
+        self._learn(us, arrived)
+        self._last = (seq, us)
+        self._last_ns = max(self._last_ns + 1, self._unix_ns + self._host_ns(us))
+        return jumped
 
     def follow(self, unix_minus_monotonic_ns: int) -> float:
         """Step of the host's wall clock since the last call [s], 0 if there was none.
@@ -159,6 +215,39 @@ class DeviceClock:
     def _ppm(self, slope: float) -> float:
         """Drift of the device's clock if samples come later by `slope` [ns] each microsecond."""
         return 1e6 * (self._ns_per_us / (self._ns_per_us + slope) - 1.0)
+
+
+@kernel()
+def _stamp_along(
+    samples: IntArray, at: int, line: _Line, place: _Place, stamps: IntArray
+) -> tuple[int, int, int, int, int, float]:
+    """Stamp samples from `at` on, up to one that jumps or begins another quarter second.
+
+    Args:
+        samples: shape (3, n): numbers, device's clock [µs], arrival [ns].
+        at: the first to be stamped.
+        line, place: before it.
+        stamps: shape (n,), filled: Unix time [ns].
+
+    Returns:
+        The first one that is not stamped, and the place before it without the quarter's end.
+    """
+    seq, us, ns = place.seq, place.us, place.ns
+    earliest, least = place.earliest, place.late
+    while at < stamps.size:
+        odd_us = samples[1, at] - us - (samples[0, at] - seq) * line.period_us
+        relative = samples[1, at] - line.us0
+        if abs(odd_us) >= _JUMP_PERIODS * line.period_us or relative >= place.end:
+            break
+        late = samples[2, at] - line.ns0 - relative * line.ns_per_us
+        if late < least:
+            earliest, least = relative, late
+        seq, us = samples[0, at], samples[1, at]
+        along = relative * line.ns_per_us + (line.offset + line.slope * (relative - line.centre))
+        ns = max(ns + 1, line.unix_ns + line.ns0 + int(np.rint(along)))
+        stamps[at] = ns
+        at += 1
+    return at, seq, us, ns, earliest, least
 
 
 def _likely_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:

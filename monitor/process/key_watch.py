@@ -4,8 +4,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
-from monitor.alarms import Occasion
-from monitor.process.link_watch import Seen, occasion
+from monitor.process.link_watch import Cause, Report, Seen
 from rigwatch.wire.access import ending_soon, ends_text, read_register
 from rigwatch.wire.errors import KeysError
 
@@ -25,12 +24,12 @@ class KeyWatch:
         self._due_ns: int | None = None
         self._text = ""
 
-    def reports(self, seen: Seen) -> Iterator[tuple[str, Occasion, bool]]:
-        """Name, occasion and state of the alarm; without keys it never holds."""
+    def reports(self, seen: Seen) -> Iterator[Report]:
+        """The alarm; without keys it never holds."""
         if self._keys and (self._due_ns is None or seen.monotonic_ns >= self._due_ns):
             self._due_ns = seen.monotonic_ns + BETWEEN_NS
             self._text = self._checked(seen.t_ns)
-        yield "certificates_end", occasion(seen, text=self._text), bool(self._text)
+        yield "certificates_end", Cause(text=self._text), bool(self._text)
 
     def _checked(self, t_ns: int) -> str:
         """Which certificates end soon; what was found before if the register cannot be read."""

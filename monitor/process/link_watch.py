@@ -6,6 +6,7 @@ arguments and reads neither clock nor bus.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from monitor.alarms import Occasion
 from rigwatch.wire.messages import Health
@@ -51,6 +52,18 @@ class Seen:
     position: tuple[int, int]
 
 
+class Cause(NamedTuple):
+    """Why an alarm holds that no sample raises: a value and its limit, and what the cause adds."""
+
+    value: float = float("nan")
+    high: float = float("nan")
+    text: str = ""
+
+
+Report = tuple[str, Cause, bool]
+"""Name of an alarm, its cause if it holds, and whether it does."""
+
+
 class LinkWatch:
     """Decides which of the link's alarms hold.
 
@@ -70,16 +83,16 @@ class LinkWatch:
         self._lost += samples
         self._lost_at_ns = monotonic_ns
 
-    def reports(self, seen: Seen) -> Iterator[tuple[str, Occasion, bool]]:
-        """Name, occasion and state of every alarm of the link."""
+    def reports(self, seen: Seen) -> Iterator[Report]:
+        """Every alarm of the link."""
         silent_ms, limit_ms = seen.silent_s * 1e3, self._stale_after * 1e3
         stale = seen.silent_s > self._stale_after
-        yield "stale", occasion(seen, silent_ms, limit_ms), stale
+        yield "stale", Cause(silent_ms, limit_ms), stale
         gone = bool(seen.daq_trouble) and (stale or seen.flowed)
-        yield "link", occasion(seen, text=seen.daq_trouble), gone
-        yield "duplicate_source", occasion(seen), seen.contested
+        yield "link", Cause(text=seen.daq_trouble), gone
+        yield "duplicate_source", Cause(), seen.contested
         losing = seen.monotonic_ns - self._lost_at_ns < LOSS_SHOWN_NS
-        yield "loss", occasion(seen, float(self._lost), 0.0, "samples lost so far"), losing
+        yield "loss", Cause(float(self._lost), 0.0, "samples lost so far"), losing
 
     def lasting_reason(self, seen: Seen) -> str:
         """Why no samples arrive, once it has been the same reason for a while; "" before."""
@@ -96,26 +109,23 @@ class LinkWatch:
         return step if abs(step) > CLOCK_STEP_NS else 0
 
 
-def device_reports(
-    seen: Seen, daq: Health | None, unjudged_s: float, why: str
-) -> Iterator[tuple[str, Occasion, bool]]:
+def device_reports(daq: Health | None, unjudged_s: float, why: str) -> Iterator[Report]:
     """The same for faults of the device while samples arrive.
 
     Args:
-        seen: current observations.
         daq: the last health message of data acquisition, None if there is none.
         unjudged_s: time since the last estimate, while samples arrived [s].
         why: why there are no estimates, "" if unknown.
     """
     state, text = (daq.state, daq.text) if daq else ("", "")
-    yield "line_noise", occasion(seen, text=text), state == "garbage"
-    yield "slow_device", occasion(seen, text=text), state == "slow"
+    yield "line_noise", Cause(text=text), state == "garbage"
+    yield "slow_device", Cause(text=text), state == "slow"
     drift, certain = _drift(daq.counters if daq else {})
-    at = occasion(seen, drift, DRIFT_PPM, f"off by {drift:.0f} ppm")
+    at = Cause(drift, DRIFT_PPM, f"off by {drift:.0f} ppm")
     yield "clock_drift", at, certain > DRIFT_PPM
-    at = occasion(seen, drift, WRONG_PPM, f"off by {drift:.0f} ppm")
+    at = Cause(drift, WRONG_PPM, f"off by {drift:.0f} ppm")
     yield "clock_wrong", at, certain > WRONG_PPM
-    yield "estimates_missing", occasion(seen, text=why), unjudged_s > UNJUDGED_S
+    yield "estimates_missing", Cause(text=why), unjudged_s > UNJUDGED_S
 
 
 def _drift(counters: Mapping[str, float]) -> tuple[float, float]:
@@ -125,12 +135,11 @@ def _drift(counters: Mapping[str, float]) -> tuple[float, float]:
 
 
 def disk_reports(
-    seen: Seen, recorder: Health | None, absence: str, journal_failure: str = ""
-) -> Iterator[tuple[str, Occasion, bool]]:
+    recorder: Health | None, absence: str, journal_failure: str = ""
+) -> Iterator[Report]:
     """The same for the alarms of disk and recording.
 
     Args:
-        seen: current observations.
         recorder: the recorder's last health message, None if it has never sent one.
         absence: why the recorder's process is not seen, "" if it is.
         journal_failure: why the alarm journal cannot be written, "" if it can.
@@ -139,19 +148,18 @@ def disk_reports(
     short = bool(recorder and recorder.counters.get("disk_trouble", 0.0) > 0.0)
     text = (recorder.text if recorder and short else "") or journal_failure
     free_text = f"{free:.1%} of the disk is free"
-    yield "disk", occasion(seen, text=text or free_text), short or bool(journal_failure)
-    yield "disk_almost_full", occasion(seen, text=free_text), 0.0 <= free < ALMOST_FULL
+    yield "disk", Cause(text=text or free_text), short or bool(journal_failure)
+    yield "disk_almost_full", Cause(text=free_text), 0.0 <= free < ALMOST_FULL
     gone = recorder is not None and bool(absence)
     stopped = recorder is not None and recorder.state == "not recording"
     why = absence if gone else recorder.text if recorder else ""
-    yield "recording_stopped", occasion(seen, text=why), gone or stopped
+    yield "recording_stopped", Cause(text=why), gone or stopped
 
 
-def occasion(
-    seen: Seen, value: float = float("nan"), high: float = float("nan"), text: str = ""
-) -> Occasion:
-    """The occasion of an alarm that no sample raises."""
+def occasion(seen: Seen, cause: Cause, t_ns: int) -> Occasion:
+    """The occasion at `t_ns` [ns] of an alarm that no sample raises."""
     boot, seq = seen.position
+    nan = float("nan")
     return Occasion(
-        seen.device, boot, seq, seen.t_ns, value, float("nan"), high, onset_seq=seq, text=text
+        seen.device, boot, seq, t_ns, cause.value, nan, cause.high, onset_seq=seq, text=cause.text
     )

@@ -8,10 +8,9 @@ import threading
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 
-from monitor.alarms import AlarmJournal, Announcement, Occasion, just_returned
+from monitor.alarms import AlarmJournal, Announcement, just_returned
 from monitor.detectors import FRICTION, detectors_of
 from monitor.diagnosis import Explainer
 from monitor.model import RigModel, load_model
@@ -19,7 +18,14 @@ from monitor.pipeline import Judged, Ready, RigMonitor, compile_kernels, ready_o
 from monitor.process.cursor import Cursor
 from monitor.process.health import HealthBook
 from monitor.process.key_watch import KeyWatch
-from monitor.process.link_watch import LinkWatch, Seen, device_reports, disk_reports
+from monitor.process.link_watch import (
+    LinkWatch,
+    Report,
+    Seen,
+    device_reports,
+    disk_reports,
+    occasion,
+)
 from monitor.process.model_requests import ModelDesk, Place
 from monitor.process.operator_desk import OperatorDesk
 from monitor.process.presence import Presence
@@ -158,9 +164,9 @@ class MonitorProcess:
             self.bus.publish(EVENTS, event)
         seen = self._seen()
         self.say(self.rig.alarms.pass_to(now_ns))
-        for name, occasion, holds in self._reports(seen):
+        for name, cause, holds in self._reports(seen):
             if self.rig.alarms.holds(name) != holds:
-                at = replace(occasion, t_ns=now_ns)
+                at = occasion(seen, cause, now_ns)
                 self.say(self.rig.alarms.report(name, at, active=holds))
         if reason := self._links.lasting_reason(seen):
             self.say(self.rig.alarms.reword("link", reason, now_ns))
@@ -176,15 +182,15 @@ class MonitorProcess:
             self.rig.alarms.set_back(back_ns)
         return self._time.now(monotonic_ns)
 
-    def _reports(self, seen: Seen) -> Iterator[tuple[str, Occasion, bool]]:
-        """Name, occasion and state of the alarms that no sample raises."""
+    def _reports(self, seen: Seen) -> Iterator[Report]:
+        """The alarms that no sample raises."""
         yield from self._links.reports(seen)
         unjudged = self._delivered_s - self._estimated_s
-        yield from device_reports(seen, self._daq, unjudged, self._unsuitable)
+        yield from device_reports(self._daq, unjudged, self._unsuitable)
         failure = self._journal.failure if self._journal else ""
         there = self._recorder_presence.holds(time.monotonic())
         absence = "" if there else self._absence("recorder")
-        yield from disk_reports(seen, self._recorder, absence, failure)
+        yield from disk_reports(self._recorder, absence, failure)
         yield from self._keys.reports(seen)
 
     def _announce_router(self, seen: Seen) -> None:

@@ -117,3 +117,33 @@ def test_the_wall_clock_is_followed_forward_only() -> None:
     assert clock.follow(UNIX_NS - 30_000_000_000) == 0.0
     assert clock.follow(UNIX_NS + 10_000_000_000) == pytest.approx(40.0)
     assert clock.unix_ns(5) == UNIX_NS + 10_000_000_005
+
+
+@pytest.mark.parametrize("clock_rate", [1.0, 10.0])
+def test_samples_stamped_together_have_the_stamps_of_each_alone(clock_rate: float) -> None:
+    random = np.random.default_rng(5)
+    late = random.exponential(4e5, 256 * 40).astype(np.int64)
+    run = run_of(256 * 40, drift=3e-4, late_ns=late)
+    us = run.device_us.copy()
+    us[256 * 30 + 7 :] += 70_000  # jumps in the middle of a block
+    together = DeviceClock(256.0, clock_rate, unix_minus_monotonic_ns=UNIX_NS)
+    alone = DeviceClock(256.0, clock_rate, unix_minus_monotonic_ns=UNIX_NS)
+    ends = np.cumsum(random.integers(1, 14, len(us)))
+    found, expected, jumps = [], [], []
+    for part in np.split(np.arange(len(us)), ends[ends < len(us)]):
+        block = RawBlock(1, run.seq[part], us[part], run.codes[part], run.arrived_ns[part])
+        stamps, jump = together.stamp(block)
+        found += stamps.tolist()
+        jumps.append(jump)
+        for row in zip(
+            part.tolist(), us[part].tolist(), run.arrived_ns[part].tolist(), strict=True
+        ):
+            alone._stamp_one(*row)
+            expected.append(alone._last_ns)
+    assert found == expected
+    assert together.jumps == alone.jumps >= 1
+    assert any(jumps)
+    assert (together.drift_ppm, together.certain_drift_ppm) == (
+        alone.drift_ppm,
+        alone.certain_drift_ppm,
+    )

@@ -45,6 +45,10 @@ class Verdict:
     remark: str = ""
 
 
+NO_CHANGE = Verdict()
+"""The decision on nearly every block."""
+
+
 class Sources:
     """The known sources, and the one in control."""
 
@@ -151,6 +155,8 @@ class Sources:
     def _current_spoke(self, block: SampleBlock | Numbered) -> Verdict:
         self._silent = False
         self._latest_ns = max(self._latest_ns, int(block.t_ns[-1]))
+        if not self._rivals:
+            return NO_CHANGE
         for rival in self._rivals.values():
             rival.from_seq = rival.last + 1
         untold = [boot for boot, rival in self._rivals.items() if not rival.told]
