@@ -15,9 +15,9 @@ LOSS_SHOWN_NS = 1_000_000_000
 """Time for which a loss alarm holds after the last gap [ns]."""
 DRIFT_PPM, WRONG_PPM = 500.0, 5000.0
 """Clock deviations of a device above which a warning and an error are raised [ppm]."""
-REASON_LASTS_NS = 2_000_000_000
-"""Time after which another reason of an absent device is told; attempts to open it fail in turn for
-several reasons [ns].
+REASON_LASTS_NS, TOLD_LASTS_NS = 2_000_000_000, 60_000_000_000
+"""Time after which another reason of an absent device is told, and one that has been told before;
+attempts to open it fail in turn for several reasons [ns].
 """
 UNJUDGED_S = 1.0
 """Time without an estimate, while samples arrive, after which an alarm is raised [s]."""
@@ -77,6 +77,7 @@ class LinkWatch:
         self._lost_at_ns = -LOSS_SHOWN_NS
         self._clock_offset_ns: int | None = None
         self._reason, self._reason_since_ns = "", 0
+        self._told: set[str] = set()
 
     def lost(self, samples: int, monotonic_ns: int) -> None:
         """Record lost samples; 0 for an unknown number."""
@@ -96,10 +97,15 @@ class LinkWatch:
 
     def lasting_reason(self, seen: Seen) -> str:
         """Why no samples arrive, once it has been the same reason for a while; "" before."""
+        if not seen.daq_trouble:
+            self._told.clear()
         if seen.daq_trouble != self._reason:
             self._reason, self._reason_since_ns = seen.daq_trouble, seen.monotonic_ns
-        lasts = seen.monotonic_ns - self._reason_since_ns >= REASON_LASTS_NS
-        return self._reason if lasts else ""
+        lasts = TOLD_LASTS_NS if self._reason in self._told else REASON_LASTS_NS
+        if seen.monotonic_ns - self._reason_since_ns < lasts:
+            return ""
+        self._told.add(self._reason)
+        return self._reason
 
     def clock_step(self, seen: Seen) -> int:
         """Step of the wall clock since the last call [ns]; 0 if it was not set."""

@@ -412,6 +412,17 @@ def test_a_reason_counts_once_it_has_lasted_and_attempts_that_fail_in_turn_do_no
     assert watch.lasting_reason(seen(4.9, 4.9, trouble="no answer")) == ""
     assert watch.lasting_reason(seen(5.1, 5.1, trouble="no answer")) == "no answer"
     assert watch.lasting_reason(seen(5.2, 5.2, trouble="another device")) == ""
+    assert watch.lasting_reason(seen(7.3, 7.3, trouble="another device")) == "another device"
+
+
+def test_reasons_that_take_turns_are_told_once_a_minute_at_most() -> None:
+    watch = LinkWatch(0.1)
+    turns = [("no answer", "closed")[t // 5 % 2] for t in range(300)]
+    told = [watch.lasting_reason(seen(t, t, trouble=why)) for t, why in enumerate(turns)]
+    assert [why for why in told if why] == ["no answer", "closed"]
+    watch.lasting_reason(seen(301, 301))
+    again = [watch.lasting_reason(seen(t, t, trouble="closed")) for t in (302, 303, 304)]
+    assert again == ["", "", "closed"]
 
 
 def test_a_clock_that_was_set_is_noticed_and_one_that_runs_is_not() -> None:
