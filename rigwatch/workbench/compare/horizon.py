@@ -13,9 +13,9 @@ A drive that steps once a minute meets windows of a minute always at the same pl
 window's beginning or end, the window's own initial state takes up all that a lag does after a step.
 The horizon is then shortened until the steps fall inside the windows.
 
-A state that no channel shows is free at the beginning of each window. Over windows shorter than its
-time constant it takes up what the model lacks, so that many parameters fit alike and no two starts
-agree. Longer windows, of which fewer remain, are then tried.
+A state that no channel shows may take up what the model lacks: to begin with it is free in each
+window, and windows shorter than its time constant may lead no two starts to the same optimum from
+which it could continue. Longer windows, of which fewer remain, are then tried.
 """
 
 from collections.abc import Iterator

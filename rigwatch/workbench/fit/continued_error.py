@@ -11,12 +11,15 @@ from rigwatch.workbench.fit.fitted import Fitted, overall_error
 
 
 def continued_train_error(fitted: Fitted, data: Data) -> float:
-    """Training error over all channels; that of the fit itself if no effect has states.
+    """Training error over all channels; that of the fit itself if it continues them already.
+
+    The same if no effect has states.
 
     Raises:
         ModelError: the continued states diverge.
     """
-    if not any(placement.effect.states for placement in fitted.placements):
+    states = any(placement.effect.states for placement in fitted.placements)
+    if fitted.train.continued or not states:
         return fitted.train_error
     train = fitted.train
     judged = evaluate(

@@ -31,6 +31,7 @@ from rigwatch.physics.engine.search import (
     WholeRuns,
     continued_spread,
     convergence,
+    fit_continued,
     has_hidden_states,
     kept_promise,
     multi_start_fit,
@@ -233,6 +234,9 @@ def _trained(  # noqa: PLR0917 -- the arguments of `fit_model`
     begin, substeps = compiled.vector(start), study.file.substeps
     first = base.train.initial if base else None
     fit_over = partial(fit, compiled, data.train, scale=scale, substeps=substeps)
+    last_fit = fit_over
+    if _may_continue(study, data):
+        last_fit = partial(fit_continued, compiled, data.train, scale=scale, substeps=substeps)
     search: ShortHorizons | WholeRuns | None = None
     if data.along_motion and len(compiled.system.free) >= MANY_PARAMETERS and scale is not None:
         search = WholeRuns(
@@ -250,7 +254,7 @@ def _trained(  # noqa: PLR0917 -- the arguments of `fit_model`
     free_run = study.model.states and not data.along_motion
     if free_run and (horizon >= LONG or from_short_horizons):
         begin = fit_over(horizon // SHORTER, start=begin).parameters
-    found = _settled(study, data, fit_over(horizon, start=begin, initial=first), horizon, substeps)
+    found = _settled(study, data, last_fit(horizon, start=begin, initial=first), horizon, substeps)
     return found, None, horizon
 
 
@@ -262,12 +266,20 @@ def _compiled(
     return replace(compiled, system=resolved(compiled.system, compiled.vector(start), spacing))
 
 
+def _may_continue(study: Study, data: Data) -> bool:
+    """Whether hidden states may continue from window to window.
+
+    Along the motion they follow it, and those of a rough model have its reference.
+    """
+    return not (data.along_motion or study.model.rough)
+
+
 def _settled(study: Study, data: Data, found: Fit, horizon: int, substeps: int) -> Fit:
     """The fit with undetermined parameter combinations resolved, before it is judged.
 
     Along the motion, priors resolve them; the learned terms of a rough model are inherently tied.
     """
-    if data.along_motion or study.model.rough:
+    if not _may_continue(study, data):
         return found
     system = found.compiled.system
     centre = {name: p.value for name, p in system.parameters.items()}
@@ -276,7 +288,9 @@ def _settled(study: Study, data: Data, found: Fit, horizon: int, substeps: int) 
         centre[placement.prefix + strength] = placement.effect.parameters[strength].neutral
     judged = partial(_continued_error, recording=data.train, horizon=horizon, substeps=substeps)
     hidden = has_hidden_states(system)
-    return untied(found, data.train, horizon, centre, substeps, judged if hidden else None)
+    return untied(
+        found, data.train, horizon, centre, substeps, fit_continued, judged if hidden else None
+    )
 
 
 def _continued_error(found: Fit, recording: Recording, horizon: int, substeps: int) -> float:
@@ -300,8 +314,7 @@ def _judged(  # noqa: PLR0917 -- they belong together
     length = data.horizon if study.model.states else len(data.held_out)
     substeps = study.file.substeps
     found = with_opening_values(found, study.model, data.openings, data.horizon, substeps)
-    # Along the motion hidden states follow it; a rough model is judged with its reference.
-    judging = not (data.along_motion or study.model.rough)
+    judging = _may_continue(study, data)
     further = {"steps": TO_THE_END} if data.along_motion else {}
     judged = evaluate(found, data.held_out, length, substeps, initial, judging=judging, **further)
     calm = away_from_jumps(found, data.held_out, length)

@@ -18,6 +18,7 @@ from scipy.stats import t as student
 
 from rigwatch.physics.engine.compile import CompiledSystem
 from rigwatch.physics.engine.fit import Fit, Recording, fit
+from rigwatch.physics.engine.search import fit_continued
 from rigwatch.workbench.fit.fitted import Fitted
 from rigwatch.workbench.fit.intervals import CONFIDENCE, Value, covariance, values
 
@@ -89,7 +90,7 @@ def _error(search: _Search, name: str, at: float) -> float:
     compiled = CompiledSystem(replace(system, parameters=parameters), fitted.compiled.kernel)
     start = fitted.parameters.copy()
     start[list(parameters).index(name)] = at
-    again = fit(
+    again = (fit_continued if fitted.continued else fit)(
         compiled, search.recording, search.horizon, start=start, scale=fitted.scale,
         substeps=search.substeps,
     )  # fmt: skip

@@ -72,6 +72,9 @@ def rank(
     while spare := _substitute_of_vague(rows):
         progress(f"fitting {spare.label}, as the strength of the effect it resembles is open")
         refit(study, data, base, spare, fit_model)
+    for spare in _substitutes_of_refused(base, rows):
+        progress(f"fitting {spare.label}, as the effect it resembles is refused")
+        refit(study, data, base, spare, fit_model)
     while similar := _unfitted_similar(rows, floor):
         progress(f"fitting {similar.label}, which resembles the best")
         refit(study, data, base, similar, fit_model if enough else fit_with_retry)
@@ -147,6 +150,19 @@ def _substitute_of_vague(rows: Sequence[Ranked]) -> Ranked | None:
         ),
         None,
     )
+
+
+def _substitutes_of_refused(base: Fitted, rows: Sequence[Ranked]) -> list[Ranked]:
+    """Rows skipped for refused ones, of a model whose hidden states continue through the windows.
+
+    Scores find two directions alike if hidden states begin anew in each window; what they do to
+    states that continue may differ.
+    """
+    if not base.train.continued:
+        return []
+    refused = {row.label for row in rows if row.fitted is not None and not row.accepted}
+    waiting = [row for row in rows if row.fitted is None and not row.failure]
+    return [r for r in waiting if r.fitted_instead in refused and r.p_alone < LEVEL]
 
 
 def _unfitted_similar(rows: Sequence[Ranked], floor: NoiseFloor) -> Ranked | None:

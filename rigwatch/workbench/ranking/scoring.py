@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigwatch.physics.engine.fit import windows
+from rigwatch.physics.engine.fit import Fit, windows
 from rigwatch.physics.engine.score import (
     Candidate,
     Projector,
@@ -33,7 +33,7 @@ def score_all(data: Data, base: Fitted, found: Sequence[Candidate]) -> Scores:
         data, base: the recordings and the fitted model.
         found: the candidates.
     """
-    fitted, recording = base.train, data.train
+    fitted, recording = _scored_fit(base), data.train
     cut = windows(base.compiled.system, len(recording), base.horizon)
     moved, slopes = per_recording(_along, data, base, found)
     measured = np.isfinite(recording.outputs)[cut.starts[:, None] + np.arange(cut.length)]
@@ -49,9 +49,17 @@ def score_all(data: Data, base: Fitted, found: Sequence[Candidate]) -> Scores:
     return score(residual, moved, fixed, float(np.mean(residual**2)))
 
 
+def _scored_fit(base: Fitted) -> Fit:
+    """The fit that is the optimum for initial states as the score test projects them out.
+
+    These are all states of each window.
+    """
+    return base.train.begun_anew or base.train
+
+
 def _along(data: Data, base: Fitted, found: Sequence[Candidate]) -> tuple[FloatArray, FloatArray]:
     """Scaled directions of the candidates and slopes of the model, at every sample."""
-    fitted, recording = base.train, data.train
+    fitted, recording = _scored_fit(base), data.train
     cut = windows(base.compiled.system, len(recording), base.horizon)
     substeps = nodes(base, recording)
     at = trajectory(
@@ -87,7 +95,8 @@ def scored(
         every: include effects whose strength would be outside its bounds.
     """
     scores = score_all(data, base, found)
-    p_values = corrected_p_values(scores, base.train.residuals / base.train.scale)
+    fitted = _scored_fit(base)
+    p_values = corrected_p_values(scores, fitted.residuals / fitted.scale)
     strengths = scores.strength.tolist()
     allowed = [every or possible(c, at) for c, at in zip(found, strengths, strict=True)]
     ports = study.model.ports

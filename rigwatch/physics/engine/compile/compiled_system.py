@@ -30,11 +30,13 @@ class Simulation:
         slopes: shape (windows, samples, outputs, free parameters + states): derivatives of the
             outputs by the free parameters, then by the window's initial states.
         last: states at each window's last sample, shape (windows, states).
+        last_slopes: of these by the same, shape (windows, states, free parameters + states).
     """
 
     outputs: FloatArray
     slopes: FloatArray
     last: FloatArray
+    last_slopes: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,9 +111,11 @@ class CompiledSystem:
         needed = min(finest, steps_for(self.system, self._rates, parameters, dt))
         steps = max(substeps, needed)
         arguments = self._arguments(inputs, dt, starts, length, initial, parameters, steps)
-        last = np.empty((len(starts), len(self.system.states)))
+        n = len(self.system.states)
+        last = np.empty((len(starts), n * (1 + self.columns)))
         self.kernel.simulate(*arguments, outputs, slopes, last, rows, finest)
-        return Simulation(outputs, slopes, last)
+        last_slopes = last[:, n:].reshape(len(starts), n, self.columns)
+        return Simulation(outputs, slopes, last[:, :n], last_slopes)
 
     def fastest(self, parameters: FloatArray) -> float:
         """The largest of the model's constant rates; 0 without any [1/s].

@@ -219,7 +219,7 @@ def simulate(  # noqa: PLR0917 -- a kernel
     hold: FloatArray, starts: IntArray, x0: FloatArray, p: FloatArray, y: FloatArray,
     dy: FloatArray, last: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill outputs y (windows, samples, outputs), slopes dy (…, m) and last states of each window.
+    """Fill outputs y (windows, samples, outputs), slopes dy (…, m) and the last z of each window.
 
     Held inputs change every `rows` rows. Each interval uses `substeps` steps, or as many up to
     `finest` as the `asked` rates of `pace` require.
@@ -256,7 +256,7 @@ def simulate(  # noqa: PLR0917 -- a kernel
                 if updated and (row + 1) % rows == 0:
                     renew(update, u, row + 1, hold, rows, dt, pp, z, dz, us)
                 forget(z)
-        for i in range(n):
+        for i in range(size):
             last[w, i] = z[i]
 
 

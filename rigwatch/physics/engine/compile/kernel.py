@@ -138,7 +138,7 @@ class NativeKernel:
         self, u: Any, dt: Any, substeps: Any, hold: Any, starts: Any, x0: Any, p: Any, y: Any,
         dy: Any, last: Any, rows: int, finest: int,
     ) -> None:  # fmt: skip
-        """Fill outputs (windows, samples, outputs), their slopes (…, m) and the last states."""
+        """Fill outputs (windows, samples, outputs), their slopes (…, m) and the last [x | S]."""
         kernel = partial(
             driver.simulate, *self._compiled_along(), bool(self._system.updates),
             len(self._system.pace.asked), self._crossing, self._columns, rows, u, dt, substeps,

@@ -5,6 +5,7 @@ Recording ──windows──▶ Problem (initial states projected out) ──�
 
 from rigwatch.physics.engine.fit.decimation import Thinning
 from rigwatch.physics.engine.fit.effect_states import EffectStates
+from rigwatch.physics.engine.fit.initial_state_projection import Tangent
 from rigwatch.physics.engine.fit.measured_recording import (
     motion_phases,
     motion_recording,
@@ -12,7 +13,7 @@ from rigwatch.physics.engine.fit.measured_recording import (
 )
 from rigwatch.physics.engine.fit.opening_values import with_opening_values
 from rigwatch.physics.engine.fit.port_signals import port_signals
-from rigwatch.physics.engine.fit.problem import Problem
+from rigwatch.physics.engine.fit.problem import ENOUGH, Problem, Started
 from rigwatch.physics.engine.fit.recorded_effect_states import RecordedEffectStates
 from rigwatch.physics.engine.fit.recording import (
     Recording,
@@ -26,6 +27,7 @@ from rigwatch.physics.engine.fit.recording import (
 from rigwatch.physics.engine.fit.ties import untied
 from rigwatch.physics.engine.fit.windowed_fit import (
     Fit,
+    Prior,
     bounds,
     error_at,
     evaluate,
@@ -34,11 +36,15 @@ from rigwatch.physics.engine.fit.windowed_fit import (
 )
 
 __all__ = [
+    "ENOUGH",
     "EffectStates",
     "Fit",
+    "Prior",
     "Problem",
     "RecordedEffectStates",
     "Recording",
+    "Started",
+    "Tangent",
     "Thinning",
     "beginning",
     "bounds",

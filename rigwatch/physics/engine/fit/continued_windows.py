@@ -14,7 +14,7 @@ is one window, its first part determines them and does not count.
 import numpy as np
 
 from rigwatch.physics.engine.fit.problem import Problem, Started
-from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
+from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
 
 LEAD = 0.1
@@ -51,23 +51,13 @@ def _continued_from_previous(problem: Problem, parameters: FloatArray) -> FloatA
     effect_states = np.array([column for column in problem.hidden if column not in own], np.int64)
     initial = problem.initial.copy()
     rest = np.setdiff1d(np.arange(len(initial)), problem.first_windows)
-    order = _window_order(problem) if len(effect_states) else [rest]
+    order = problem.window_order if len(effect_states) else [rest]
     for rows in order:
         ended = problem.ends_before(parameters, rows)
         initial[rows] = ended
         # Effect states continue; the model's own states are re-initialised in the next window.
         problem.begin_at(rows, effect_states, ended[:, effect_states])
     return initial[:, problem.hidden]
-
-
-def _window_order(problem: Problem) -> list[IntArray]:
-    """Windows except the first of each recording: all second ones, then all third ones, …"""
-    windows = np.arange(len(problem.starts))
-    since = (
-        windows
-        - problem.first_windows[np.searchsorted(problem.first_windows, windows, side="right") - 1]
-    )
-    return [np.nonzero(since == turn)[0] for turn in range(1, int(since.max()) + 1)]
 
 
 def _from_first_samples(problem: Problem, parameters: FloatArray) -> Started:

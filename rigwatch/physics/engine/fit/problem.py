@@ -148,6 +148,24 @@ class Problem:
         begins = np.concatenate([[0], ends[:-1]])
         return np.unique(np.searchsorted(self._cut.starts, begins))
 
+    @cached_property
+    def window_order(self) -> list[IntArray]:
+        """Windows except the first of each recording: all second ones, then all third ones, …"""
+        every = np.arange(len(self.starts))
+        begun = np.searchsorted(self.first_windows, every, side="right") - 1
+        since = every - self.first_windows[begun]
+        return [np.nonzero(since == turn)[0] for turn in range(1, int(since.max()) + 1)]
+
+    @property
+    def measured_states(self) -> IntArray:
+        """Columns of the unknown states that channels measure."""
+        return np.setdiff1d(self._unknown, self.hidden)
+
+    @property
+    def limits(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper bounds of the states, each of shape (states,)."""
+        return self._low, self._high
+
     def begin_at(self, rows: IntArray, columns: IntArray, values: FloatArray) -> None:
         """Set the initial values of some states in some windows."""
         self.initial = self.initial.copy()
@@ -207,7 +225,7 @@ class Problem:
         found[:, self.hidden] = np.clip(run.last, self._low, self._high)[:, self.hidden]
         return np.where(np.isfinite(found), found, self.initial)
 
-    def _follow_inputs(self, parameters: FloatArray) -> None:
+    def follow_inputs(self, parameters: FloatArray) -> None:
         """Initialise effect states at actuators from the inputs; the first window's are fitted."""
         self._set_effect_states(parameters, self._effect_states.exact, since=1)
 
@@ -225,8 +243,35 @@ class Problem:
     ) -> tuple[FloatArray, FloatArray]:
         """Scaled residuals (rows, k), slopes (rows, k, free + states); 0 if unmeasured."""
         run = self._run(parameters, rows, initial)
-        error = (self.measured[rows] - run.outputs) / self.scale
-        slopes = run.slopes / self.scale[:, None]
+        return self._scaled(run.outputs, run.slopes, rows)
+
+    def simulated_to_next(
+        self, parameters: FloatArray, rows: IntArray, initial: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """`simulated`, and the states at the first sample after each window with their slopes.
+
+        Returns:
+            Scaled residuals and slopes; states (rows, states), slopes (rows, states, free +
+            states).
+        """
+        run = self.compiled.simulate(
+            self._inputs_and_next, self.recording.dt, self._cut.starts[rows], self._cut.length + 1,
+            initial=initial, parameters=parameters, substeps=self._substeps,
+        )  # fmt: skip
+        error, slopes = self._scaled(run.outputs[:, :-1], run.slopes[:, :-1], rows)
+        return error, slopes, run.last, run.last_slopes
+
+    @cached_property
+    def _inputs_and_next(self) -> FloatArray:
+        """The inputs with the last sample repeated, so that the last window has a next one."""
+        return np.pad(self._inputs, ((0, 1), (0, 0)), mode="edge")
+
+    def _scaled(
+        self, outputs: FloatArray, slopes: FloatArray, rows: IntArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Scaled residuals (rows, k) and slopes (rows, k, …) of simulated windows."""
+        error = (self.measured[rows] - outputs) / self.scale
+        slopes = slopes / self.scale[:, None]
         missing = np.isnan(self.measured[rows])
         if missing.any():
             error, slopes = np.where(missing, 0.0, error), np.where(missing[..., None], 0.0, slopes)
@@ -334,7 +379,7 @@ class Problem:
                 a step.
             rows: windows to settle, all if None.
         """
-        self._follow_inputs(parameters)
+        self.follow_inputs(parameters)
         rows = np.arange(len(self.initial)) if rows is None else rows
         best = self.initial[rows]
         error, slopes = self.simulated(parameters, rows, best)

@@ -35,6 +35,7 @@ def untied(  # noqa: PLR0917 -- those of `fit`
     horizon: int,
     centre: Mapping[str, float],
     substeps: int,
+    refit: Callable[..., Fit] = fit,
     judged: Callable[[Fit], float] | None = None,
 ) -> Fit:
     """The fit with its ties resolved; unchanged if there are none.
@@ -43,6 +44,7 @@ def untied(  # noqa: PLR0917 -- those of `fit`
         found: the fit.
         recording, horizon, substeps: as in `fit`.
         centre: prior means of the parameters, by name.
+        refit: `fit`, or another with the same arguments, by which it was found.
         judged: error of a fit that must not rise; that of its scaled residuals if None.
 
     Raises:
@@ -63,7 +65,7 @@ def untied(  # noqa: PLR0917 -- those of `fit`
         # Of all equivalent parameters, those nearest to the prior means.
         basis = np.linalg.qr(flat / unit[:, None]).Q
         prior = Prior(about, _noise(found) * basis.T / unit)
-        tried = fit(
+        tried = refit(
             found.compiled, recording, horizon, start=found.parameters, scale=found.scale,
             initial=found.initial, substeps=substeps, prior=prior,
         )  # fmt: skip

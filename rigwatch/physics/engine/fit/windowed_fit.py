@@ -64,6 +64,8 @@ class Fit:
         scale: divisor of each output's residuals, shape (outputs,).
         error: scaled residuals, initial states projected out, shape (windows, k).
         jacobian: ∂error/∂(free parameters), shape (windows, k, m).
+        begun_anew: of a fit whose hidden states continue from window to window, the one before in
+            which they begin anew in each, as measured ones do; None for others.
     """
 
     compiled: CompiledSystem
@@ -74,6 +76,12 @@ class Fit:
     scale: FloatArray
     error: FloatArray
     jacobian: FloatArray
+    begun_anew: "Fit | None" = None
+
+    @property
+    def continued(self) -> bool:
+        """Whether hidden states continue from window to window."""
+        return self.begun_anew is not None
 
     @property
     def rms(self) -> FloatArray:

@@ -3,6 +3,7 @@
 search (ShortHorizons, WholeRuns) ──attempts──▶ multi_start_fit ──▶ Fit, Convergence
 """
 
+from rigwatch.physics.engine.search.continued_fit import fit_continued
 from rigwatch.physics.engine.search.convergence import Convergence, convergence
 from rigwatch.physics.engine.search.hidden_states import (
     continued_spread,
@@ -20,6 +21,7 @@ __all__ = [
     "WholeRuns",
     "continued_spread",
     "convergence",
+    "fit_continued",
     "has_hidden_states",
     "hidden_states",
     "kept_promise",

@@ -32,5 +32,7 @@ def continued_spread(found: Fit, recording: Recording, horizon: int, substeps: i
     Raises:
         ModelError: the continued states diverge.
     """
+    if found.continued:
+        return spread(found)
     judged = evaluate(found, recording, horizon, substeps, found.initial, judging=True)
     return max(spread(judged), spread(found))

@@ -12,6 +12,7 @@ import numpy as np
 
 from rigwatch.physics.engine.compile import rate_limit
 from rigwatch.physics.engine.fit import Fit, Recording, bounds, error_at
+from rigwatch.physics.engine.search.continued_fit import continued_error_at
 from rigwatch.physics.engine.search.convergence import (
     PROMISED,
     UNDETERMINED,
@@ -42,6 +43,8 @@ def kept_promise(fitted: Fit, recording: Recording, horizon: int, substeps: int)
         # A fit goes no further than the recording resolves.
         if system.fastest(parameters) > limit:
             return math.inf
+        if fitted.continued:
+            return continued_error_at(fitted, recording, horizon, substeps, parameters) ** 2
         return error_at(system, recording, horizon, parameters, fitted.scale, substeps) ** 2
 
     here, step = size(fitted.parameters), _gauss_newton_step(fitted)

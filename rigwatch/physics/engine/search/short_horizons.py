@@ -22,6 +22,7 @@ import numpy as np
 
 from rigwatch.physics.engine.compile import CompiledSystem, rate_limit
 from rigwatch.physics.engine.fit import Fit, Recording, error_at, fit
+from rigwatch.physics.engine.search.continued_fit import fit_continued
 from rigwatch.physics.engine.search.convergence import PROMISED, spread
 from rigwatch.physics.engine.search.drawn_starts import drawn_start
 from rigwatch.physics.engine.search.equation_error import equation_error_starts
@@ -139,15 +140,23 @@ class ShortHorizons:
     def _attempt(self, name: str, start: FloatArray, first: Sequence[int]) -> Attempt:
         if first:
             start = self._fitted_over(first, start)
-        found = self._fit(self.horizon, start, self.initial)
+        found = self._fit(self.horizon, start, self.initial, last=True)
         gradient = kept_promise(found, self.recording, self.horizon, self.substeps)
         error = spread(found)
         if self._continues:
             error = continued_spread(found, self.recording, self.horizon, self.substeps)
         return Attempt(name, found, error, error, gradient)
 
-    def _fit(self, horizon: int, start: FloatArray, initial: FloatArray | None = None) -> Fit:
-        return fit(
+    def _fit(
+        self,
+        horizon: int,
+        start: FloatArray,
+        initial: FloatArray | None = None,
+        *,
+        last: bool = False,
+    ) -> Fit:
+        fitted = fit_continued if last and self.continued else fit
+        return fitted(
             self.compiled, self.recording, horizon, start=start, scale=self.scale,
             initial=initial, substeps=self.substeps,
         )  # fmt: skip

@@ -1,0 +1,309 @@
+"""Fits a model with hidden states continued from window to window.
+
+If each window has hidden states of its own, they take up part of what the model lacks, and the
+parameters that fit best are not those that predict best. Here only the states that channels measure
+begin anew in each window. Hidden states begin once in a recording, with values that are fitted, and
+continue through all its windows, as in multiple shooting with equality constraints (H. Bock, in
+Springer Series in Chemical Physics 18, 1981).
+
+A window's measured states are its own least-squares problem and are projected out, as in `Problem`.
+With q the parameters and the first hidden states, h the hidden states at a window's beginning and s
+its measured states, sensitivities follow the windows by
+
+    ds/dq = −S⁺·(∂e/∂q + ∂e/∂h·dh/dq),   dh⁺/dq = ∂h⁺/∂q + ∂h⁺/∂h·dh/dq + ∂h⁺/∂s·ds/dq
+
+with e the window's error, S = ∂e/∂s, and h⁺ the hidden states at the beginning of the next window.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+
+from rigwatch.physics.engine.compile import CompiledSystem, rate_limit
+from rigwatch.physics.engine.fit import (
+    ENOUGH,
+    Fit,
+    Prior,
+    Problem,
+    Recording,
+    Started,
+    Tangent,
+    bounds,
+    fit,
+    result_of,
+)
+from rigwatch.physics.engine.search.hidden_states import has_hidden_states
+from rigwatch.wire.arrays import FloatArray, IntArray
+from rigwatch.wire.errors import ModelError
+
+CONVERGED = 1e-6
+"""Relative fall of the squared error, and of the step, at which a fit ends."""
+MOST = 30
+"""Most evaluations of a fit."""
+
+
+def fit_continued(
+    compiled: CompiledSystem,
+    recording: Recording,
+    horizon: int,
+    *,
+    start: FloatArray | None = None,
+    scale: FloatArray | None = None,
+    initial: FloatArray | None = None,
+    substeps: int = 4,
+    prior: Prior | None = None,
+) -> Fit:
+    """`fit`, ended by one with hidden states continued; the same for a model that has none.
+
+    Args:
+        compiled, recording, horizon, start, scale, initial, substeps, prior: as in `fit`.
+
+    Raises:
+        ModelError: the recording is too short, or the model diverges at the start.
+    """
+    found = fit(
+        compiled, recording, horizon, start=start, scale=scale, initial=initial,
+        substeps=substeps, prior=prior,
+    )  # fmt: skip
+    if not has_hidden_states(compiled.system):
+        return found
+    windows = _ContinuedWindows(found, recording, horizon, substeps)
+    return windows.fitted(prior) if windows.continue_anywhere else found
+
+
+def continued_error_at(
+    found: Fit, recording: Recording, horizon: int, substeps: int, parameters: FloatArray
+) -> float:
+    """Root mean square of the scaled error at other parameters; infinite if it diverges.
+
+    Args:
+        found: fitted by `fit_continued`.
+        recording, horizon, substeps: what it was fitted to.
+        parameters: all of them, shape (n_p,).
+    """
+    windows = _ContinuedWindows(found, recording, horizon, substeps)
+    return windows.error_at(parameters)
+
+
+class _Path(NamedTuple):
+    """All windows at some values of the unknowns.
+
+    Attributes:
+        initial: initial states, shape (windows, states).
+        error, slopes: scaled, and by free parameters and states, as in `Started`.
+        residual, jacobian: measured states projected out, shapes (windows, k), (…, unknowns).
+    """
+
+    initial: FloatArray
+    error: FloatArray
+    slopes: FloatArray
+    residual: FloatArray
+    jacobian: FloatArray
+
+
+class _ContinuedWindows:
+    """Windows of a recording whose hidden states continue.
+
+    The unknowns are the free parameters, then the hidden states of each recording's first window.
+    """
+
+    def __init__(self, found: Fit, recording: Recording, horizon: int, substeps: int) -> None:
+        self._found = found
+        problem = self._problem = Problem(
+            found.compiled, recording, horizon, scale=found.scale, substeps=substeps,
+            initial=found.initial,
+        )  # fmt: skip
+        problem.initial = found.initial.copy()
+        self._hidden, self._m = problem.hidden, len(problem.free)
+        self._shown = problem.measured_states
+        self._fastest = rate_limit(found.compiled, found.parameters, recording.dt)
+        self._first = problem.initial[np.ix_(problem.first_windows, self._hidden)]
+        self._last: tuple[bytes, _Path] | None = None
+        self._least = np.inf
+
+    @property
+    def continue_anywhere(self) -> bool:
+        """Whether a recording has more than one window."""
+        return len(self._problem.starts) > len(self._problem.first_windows)
+
+    def fitted(self, prior: Prior | None) -> Fit:
+        """The fit from the values found so far.
+
+        Raises:
+            ModelError: continued states diverge there.
+        """
+        begin = np.append(self._found.parameters[self._problem.free], self._first)
+        path = self._path(begin)
+        if path is None:
+            raise ModelError(
+                f"{self._problem.system.model.name}: states that no channel shows diverged (NaN or"
+                " infinite) from one window to the next"
+            )
+        return self._result(self._least_squares(begin, prior))
+
+    def error_at(self, parameters: FloatArray) -> float:
+        """Error at parameters, the first hidden states moved to match, to first order."""
+        theta = parameters[self._problem.free]
+        here = self._path(np.append(self._found.parameters[self._problem.free], self._first))
+        if here is None:
+            return np.inf
+        slopes = here.jacobian.reshape(here.residual.size, -1)
+        step = theta - self._found.parameters[self._problem.free]
+        left = here.residual.ravel() + slopes[:, : self._m] @ step
+        moved = np.linalg.lstsq(slopes[:, self._m :], -left, rcond=None)[0]
+        low, high = self._bounds()
+        first = np.clip(self._first.ravel() + moved, low[self._m :], high[self._m :])
+        there = self._path(np.append(theta, first))
+        return np.inf if there is None else float(np.sqrt(np.mean(there.residual**2)))
+
+    def _least_squares(self, begin: FloatArray, prior: Prior | None) -> FloatArray:
+        """The unknowns of the smallest error near these."""
+        low, high = self._bounds()
+        size = self._problem.count
+
+        def residuals(q: FloatArray) -> FloatArray:
+            path = self._path(q)
+            own = np.full(size, np.nan) if path is None else path.residual.ravel()
+            return own if prior is None else np.append(own, prior.error(q[: self._m]))
+
+        def slopes(q: FloatArray) -> FloatArray:
+            path = self._path(q)
+            own = np.zeros((size, len(q))) if path is None else path.jacobian.reshape(size, -1)
+            if prior is None:
+                return own
+            weak = np.zeros((len(prior.slopes), len(q)))
+            weak[:, : self._m] = prior.slopes
+            return np.vstack([own, weak])
+
+        try:
+            found = scipy.optimize.least_squares(
+                residuals, np.clip(begin, low, high), jac=slopes, bounds=(low, high),
+                x_scale="jac", ftol=CONVERGED, xtol=CONVERGED, max_nfev=MOST,
+            )  # fmt: skip
+        except (ValueError, np.linalg.LinAlgError) as error:
+            raise ModelError(
+                f"{self._problem.system.model.name}: the search diverged (NaN or infinite);"
+                " try other starting values"
+            ) from error
+        return np.asarray(found.x)
+
+    def _bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper bounds of the unknowns."""
+        recordings = len(self._problem.first_windows)
+        ends = zip(bounds(self._problem.system), self._problem.limits, strict=True)
+        low, high = (np.append(own, np.tile(of[self._hidden], recordings)) for own, of in ends)
+        return low, high
+
+    def _path(self, q: FloatArray) -> _Path | None:
+        """All windows at these unknowns; None if they diverge or are too fast for the recording."""
+        key = q.tobytes()
+        if self._last is not None and self._last[0] == key:
+            return self._last[1]
+        parameters = self._problem.whole(self._found.parameters, q[: self._m])
+        if self._problem.compiled.fastest(parameters) > self._fastest:
+            return None
+        path = self._run(parameters, q)
+        if path is None:
+            return None
+        size = float(np.sum(path.residual**2))
+        if size < self._least:
+            # Measured states begin where they were best.
+            self._least, self._problem.initial = size, path.initial
+        self._last = (key, path)
+        return path
+
+    def _run(self, parameters: FloatArray, q: FloatArray) -> _Path | None:
+        problem, hidden, m = self._problem, self._hidden, self._m
+        problem.follow_inputs(parameters)
+        firsts, count = problem.first_windows, len(problem.starts)
+        initial = problem.initial.copy()
+        initial[np.ix_(firsts, hidden)] = q[m:].reshape(len(firsts), len(hidden))
+        turn = np.zeros((count, len(hidden), len(q)))
+        turn[firsts] = np.eye(len(q))[m:].reshape(len(firsts), len(hidden), len(q))
+        done: list[tuple[IntArray, _Path]] = []
+        for rows in [firsts, *problem.window_order]:
+            path, ended, moved = self._windows(parameters, rows, initial[rows], turn[rows])
+            if not (np.isfinite(ended).all() and np.isfinite(moved).all()):
+                return None
+            if not (np.isfinite(path.residual).all() and np.isfinite(path.jacobian).all()):
+                return None
+            done.append((rows, path))
+            onward = (rows + 1 < count) & ~np.isin(rows + 1, firsts)
+            initial[np.ix_(rows[onward] + 1, hidden)] = ended[onward]
+            turn[rows[onward] + 1] = moved[onward]
+        order = np.argsort(np.concatenate([rows for rows, _ in done]))
+        parts = zip(*(path for _, path in done), strict=True)
+        return _Path(*(np.concatenate(part)[order] for part in parts))
+
+    def _windows(
+        self, parameters: FloatArray, rows: IntArray, initial: FloatArray, turn: FloatArray
+    ) -> tuple[_Path, FloatArray, FloatArray]:
+        """Some windows with given hidden states, which depend on the unknowns by `turn`.
+
+        Returns:
+            The windows; the hidden states after them, and how these depend on the unknowns.
+        """
+        m, hidden = self._m, self._hidden
+        initial, (error, slopes, ended, moved) = self._settled(parameters, rows, initial)
+        tangent = self._tangent(slopes)
+        by = slopes[..., m + hidden] @ turn
+        by[..., :m] += slopes[..., :m]
+        both = tangent.without(np.concatenate([error[..., None], by], axis=-1))
+        own = -tangent.solve(by)
+        low, high = (end[hidden] for end in self._problem.limits)
+        after, by_states = ended[:, hidden], moved[:, hidden]
+        following = by_states[..., m + hidden] @ turn + by_states[..., m:] @ own
+        following[..., :m] += by_states[..., :m]
+        inside = (after >= low) & (after <= high)
+        path = _Path(initial, error, slopes, -both[..., 0], both[..., 1:])
+        return path, np.clip(after, low, high), np.where(inside[..., None], following, 0.0)
+
+    def _settled(
+        self, parameters: FloatArray, rows: IntArray, initial: FloatArray
+    ) -> tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray, FloatArray]]:
+        """Windows with their measured states moved by a Gauss-Newton step where it helps."""
+        problem, found = self._problem, self._problem.simulated_to_next(parameters, rows, initial)
+        error, slopes = found[:2]
+        if not (len(self._shown) and np.isfinite(slopes).all() and np.isfinite(error).all()):
+            return initial, found
+        step = self._tangent(slopes).solve(error[..., None])[..., 0]
+        predicted = np.sum((slopes[..., self._m :] @ step[..., None])[..., 0] ** 2, axis=1)
+        size = np.sum(error**2, axis=1)
+        (moving,) = np.nonzero(predicted > ENOUGH * size)
+        if not len(moving):
+            return initial, found
+        there = np.clip(initial[moving] + step[moving], *problem.limits)
+        tried = problem.simulated_to_next(parameters, rows[moving], there)
+        finite = np.isfinite(tried[1]).all(axis=(1, 2)) & np.isfinite(tried[3]).all(axis=(1, 2))
+        better = (np.sum(tried[0] ** 2, axis=1) < size[moving]) & finite
+        initial = initial.copy()
+        initial[moving[better]] = there[better]
+        for kept, new in zip(found, tried, strict=True):
+            kept[moving[better]] = new[better]
+        return initial, found
+
+    def _tangent(self, slopes: FloatArray) -> Tangent:
+        return Tangent(slopes[..., self._m :], [(np.arange(len(slopes)), self._shown)])
+
+    def _result(self, q: FloatArray) -> Fit:
+        """The fit at these unknowns, the first hidden states projected out."""
+        path, m, problem = self._path(q), self._m, self._problem
+        assert path is not None
+        parameters = problem.whole(self._found.parameters, q[:m])
+        plain = result_of(problem, Started(parameters, path.initial, path.error, path.slopes))
+        basis = np.linalg.qr(path.jacobian.reshape(path.residual.size, -1)[:, m:]).Q
+        both = np.concatenate([path.residual[..., None], path.jacobian[..., :m]], axis=-1)
+        flat = both.reshape(path.residual.size, 1 + m)
+        flat = flat - basis @ (basis.T @ flat)
+        residual, jacobian = flat[:, 0], flat[:, 1:]
+        states = len(path.initial) * len(self._shown) + self._first.size
+        variance = float(residual @ residual) / max(len(residual) - states - m, 1)
+        return replace(
+            plain,
+            covariance=np.asarray(np.linalg.pinv(jacobian.T @ jacobian) * variance),
+            error=residual.reshape(path.residual.shape),
+            jacobian=jacobian.reshape(*path.residual.shape, m),
+            begun_anew=self._found,
+        )
