@@ -1,4 +1,4 @@
-"""Recorder, router and witness, which run for a year, keep their memory in few pools."""
+"""Recorder, router and witness, which run for a year: few pools, little that garbage waits for."""
 
 import subprocess
 import sys
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rigwatch.wire.host import few_pools
-from tests.bus.rig import CONFIG
+from tests.bus.rig import CONFIG, TestRig
 
 POOLS_OF_EIGHT_THREADS = """
 import contextlib, ctypes, sys, threading
@@ -56,3 +56,43 @@ def test_threads_share_few_pools(tmp_path: Path, begin: str) -> None:
     code = POOLS_OF_EIGHT_THREADS.format(begin=begin)
     subprocess.run([sys.executable, "-c", code, str(config), str(pools)], check=True, timeout=60)
     assert 1 <= pools.read_text().count("<heap nr") <= few_pools.POOLS
+
+
+OBJECTS_LOOKED_AT = """
+import gc, sys, threading, time
+from pathlib import Path
+from rigwatch import recorder, router, witness
+from rigwatch.wire.rig_config import load_rig
+
+stop = threading.Event()
+process = threading.Thread(target=lambda: {begin})
+process.start()
+end = time.monotonic() + 30.0
+while not gc.get_freeze_count() and time.monotonic() < end:
+    time.sleep(0.05)
+print(gc.get_freeze_count(), len(gc.get_objects()))
+stop.set()
+process.join()
+"""
+
+
+@pytest.mark.parametrize(
+    "begin",
+    [
+        "recorder.run(Path(sys.argv[1]), stop)",
+        "recorder.run_several([Path(sys.argv[1])], stop)",
+        "witness.run(load_rig(sys.argv[1]), stop)",
+        "router.run(load_rig(sys.argv[1]), stop)",
+    ],
+)
+def test_what_start_up_made_is_not_looked_at_again(tmp_path: Path, begin: str) -> None:
+    with TestRig(tmp_path) as rig:
+        if "router" not in begin:
+            rig.router()
+        said = subprocess.run(
+            [sys.executable, "-c", OBJECTS_LOOKED_AT.format(begin=begin), str(rig.path)],
+            cwd=tmp_path, check=True, timeout=60, capture_output=True, text=True,
+        )  # fmt: skip
+    settled, looked_at = map(int, said.stdout.split())
+    assert settled > 10_000
+    assert looked_at < settled / 10
