@@ -27,7 +27,7 @@ VIEWER_PACKAGES := mesa-vulkan-drivers libvulkan1
 BROWSER_PACKAGES := chromium chromium-driver
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test sbom vulnerabilities docs demo bench lint tests-read unit again nightly commissioned demo-headless mutate lock viewer-packages clean
+.PHONY: help setup test sbom vulnerabilities docs demo bench lint tests-read unit again nightly commissioned demo-headless demo-beside mutate lock viewer-packages clean
 
 help:  ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -45,7 +45,8 @@ SYNC := $(if $(filter output-sync,$(.FEATURES)),--output-sync=target)
 # leave of the cores: both run beside them.
 test:  ## everything that is checked: style, types, layers, demo, tests
 	@$(MAKE) --no-print-directory -j2 $(STAMPS)/run viewer-packages
-	@$(MAKE) --no-print-directory -j6 $(SYNC) unit demo-headless lint sbom FIRST="commissioned tests-read"
+	@$(MAKE) --no-print-directory -j6 $(SYNC) unit demo-beside lint sbom FIRST="commissioned tests-read"
+	@if [ -e $(DEMO_FAILED) ]; then $(MAKE) --no-print-directory demo-headless; fi
 
 lint: $(STAMPS)/dev  ## ruff, mypy --strict and the rules of which layer imports which
 	@ruff check .
@@ -58,6 +59,11 @@ commissioned: $(STAMPS)/run
 
 demo-headless: commissioned
 	@rigwatch demo --headless
+
+# As with the tests: what fails beside others is tried once more, alone.
+DEMO_FAILED := $(STAMPS)/demo-failed
+demo-beside: commissioned
+	@rm -f $(DEMO_FAILED); rigwatch demo --headless || touch $(DEMO_FAILED)
 
 # Once, so that each of the workers finds the bytecode of the tests, and kernels that several need:
 # those that begin together would each compile the same.
