@@ -65,14 +65,16 @@ from rigwatch import recorder, router, witness
 from rigwatch.wire.rig_config import load_rig
 
 stop = threading.Event()
-process = threading.Thread(target=lambda: {begin})
-process.start()
-end = time.monotonic() + 30.0
-while not gc.get_freeze_count() and time.monotonic() < end:
-    time.sleep(0.05)
-print(gc.get_freeze_count(), len(gc.get_objects()))
-stop.set()
-process.join()
+
+def watch():
+    end = time.monotonic() + 30.0
+    while not gc.get_freeze_count() and time.monotonic() < end:
+        time.sleep(0.05)
+    print(gc.get_freeze_count(), len(gc.get_objects()))
+    stop.set()
+
+threading.Thread(target=watch).start()
+{begin}
 """
 
 
