@@ -97,7 +97,7 @@ class DeviceClock:
         nothing = np.zeros((3, 0), np.int64)
         line = _Line(0, 0, 0, self._ns_per_us, 0.0, 0.0, 0.0, self._period_us)
         # Compiled before the first sample arrives.
-        _stamp_along(nothing, 0, line, _Place(0, 0, 0, 0, 0, 0.0), nothing[0])
+        _stamp_line(nothing, 0, line, _Place(0, 0, 0, 0, 0, 0.0), nothing[0])
 
     def restart(self) -> None:
         """Forget the device's clock, as after a restart; time still only moves forward."""
@@ -126,13 +126,12 @@ class DeviceClock:
         if self._anchor is None or self._last is None or len(self._bins) < _BINS_FOR_LINE:
             return at
         earliest, late = self._bins[-1]
-        end = earliest // _BIN_US * _BIN_US + _BIN_US
         slope, centre, offset = self._slope, self._centre, self._offset
         line = _Line(
             *self._anchor, self._unix_ns, self._ns_per_us, slope, centre, offset, self._period_us
         )
-        place = _Place(*self._last, self._last_ns, end, earliest, late)
-        at, seq, us, self._last_ns, earliest, late = _stamp_along(samples, at, line, place, stamps)
+        place = _Place(*self._last, self._last_ns, _bin_end(earliest), earliest, late)
+        at, seq, us, self._last_ns, earliest, late = _stamp_line(samples, at, line, place, stamps)
         self._last, self._bins[-1] = (seq, us), (earliest, late)
         return at
 
@@ -188,7 +187,7 @@ class DeviceClock:
         us0, ns0 = self._anchor
         relative = us - us0
         late = arrived - ns0 - relative * self._ns_per_us
-        if self._bins and relative < self._bins[-1][0] // _BIN_US * _BIN_US + _BIN_US:
+        if self._bins and relative < _bin_end(self._bins[-1][0]):
             if late < self._bins[-1][1]:
                 self._bins[-1] = (relative, late)
         else:
@@ -217,8 +216,13 @@ class DeviceClock:
         return 1e6 * (self._ns_per_us / (self._ns_per_us + slope) - 1.0)
 
 
+def _bin_end(relative: int) -> int:
+    """Where the quarter second of a sample ends, both after the anchor [µs]."""
+    return relative // _BIN_US * _BIN_US + _BIN_US
+
+
 @kernel()
-def _stamp_along(
+def _stamp_line(
     samples: IntArray, at: int, line: _Line, place: _Place, stamps: IntArray
 ) -> tuple[int, int, int, int, int, float]:
     """Stamp samples from `at` on, up to one that jumps or begins another quarter second.

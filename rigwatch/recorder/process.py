@@ -180,7 +180,6 @@ def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event, pul
     try:
         recorder = Recorder(config, run, bus)
         pulse.ready(f"recording to {recorder.store.folder}")
-        settle_memory()
         try:
             while not stop.wait(recorder.settings.flush * _OF_FLUSH):
                 kept.check()
@@ -226,4 +225,5 @@ def run(path: Path | str, stop: threading.Event, notes: str = "") -> Path | None
     with joined(config, process_name(config), stop) as bus:
         if bus is None:
             return None
+        settle_memory()
         return record(config, describe_run(path, config, notes), bus, stop, Heartbeat(PROCESS))

@@ -11,9 +11,9 @@ from rigwatch.workbench.fit.fitted import Fitted, overall_error
 
 
 def continued_train_error(fitted: Fitted, data: Data) -> float:
-    """Training error over all channels; that of the fit itself if it continues them already.
+    """Training error over all channels.
 
-    The same if no effect has states.
+    That of the fit itself if it continues hidden states already, or no effect has any.
 
     Raises:
         ModelError: the continued states diverge.

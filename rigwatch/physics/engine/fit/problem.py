@@ -393,7 +393,7 @@ class Problem:
         step = self._steps(error, slopes, rows)
         for further in reversed(range(steps - 1)):
             size = np.sum(error**2, axis=1)
-            (moving,) = np.nonzero(self._predicted_reduction(step, slopes) > least_reduction * size)
+            (moving,) = np.nonzero(self.predicted_reduction(step, slopes) > least_reduction * size)
             if not len(moving):
                 break
             there = np.clip(best[moving] + step[moving], self._low, self._high)
@@ -413,7 +413,7 @@ class Problem:
         self.initial[rows] = best
         return error, slopes
 
-    def _predicted_reduction(self, step: FloatArray, slopes: FloatArray) -> FloatArray:
+    def predicted_reduction(self, step: FloatArray, slopes: FloatArray) -> FloatArray:
         """Predicted reduction of each window's squared error by a step, to first order."""
         moved = slopes[..., len(self.free) :] @ step[..., None]
         return np.asarray(np.sum(moved[..., 0] ** 2, axis=1))

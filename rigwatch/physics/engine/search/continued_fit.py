@@ -269,9 +269,8 @@ class _ContinuedWindows:
         if not (len(self._shown) and np.isfinite(slopes).all() and np.isfinite(error).all()):
             return initial, found
         step = self._tangent(slopes).solve(error[..., None])[..., 0]
-        predicted = np.sum((slopes[..., self._m :] @ step[..., None])[..., 0] ** 2, axis=1)
         size = np.sum(error**2, axis=1)
-        (moving,) = np.nonzero(predicted > ENOUGH * size)
+        (moving,) = np.nonzero(problem.predicted_reduction(step, slopes) > ENOUGH * size)
         if not len(moving):
             return initial, found
         there = np.clip(initial[moving] + step[moving], *problem.limits)
