@@ -146,3 +146,14 @@ def test_where_channels_show_all_states_nothing_changes() -> None:
     assert not other.continued
     assert np.array_equal(one.parameters, other.parameters)
     assert np.array_equal(one.error, other.error)
+
+
+def test_windows_that_diverge_have_an_infinite_error() -> None:
+    made = recording(0, 1)
+    growing = TANKS.replace('derivative = "k*pump', 'derivative = "r*x**3 + k*pump').replace(
+        "parameters.d", 'parameters.r = { value = 0.0, unit = "1/(V^2 s)" }\nparameters.d'
+    )
+    tanks = compiled(growing)
+    found = fit(tanks, made, HORIZON)
+    far = tanks.vector(found.values() | {"r": 1.0})
+    assert continued_error_at(found, made, HORIZON, 1, far) == np.inf

@@ -224,10 +224,11 @@ class _ContinuedWindows:
         turn[firsts] = np.eye(len(q))[m:].reshape(len(firsts), len(hidden), len(q))
         done: list[tuple[IntArray, _Path]] = []
         for rows in [firsts, *problem.window_order]:
-            path, ended, moved = self._windows(parameters, rows, initial[rows], turn[rows])
-            if not (np.isfinite(ended).all() and np.isfinite(moved).all()):
+            found = self._windows(parameters, rows, initial[rows], turn[rows])
+            if found is None:
                 return None
-            if not (np.isfinite(path.residual).all() and np.isfinite(path.jacobian).all()):
+            path, ended, moved = found
+            if not _finite(path.residual, path.jacobian, ended, moved):
                 return None
             done.append((rows, path))
             onward = (rows + 1 < count) & ~np.isin(rows + 1, firsts)
@@ -239,14 +240,17 @@ class _ContinuedWindows:
 
     def _windows(
         self, parameters: FloatArray, rows: IntArray, initial: FloatArray, turn: FloatArray
-    ) -> tuple[_Path, FloatArray, FloatArray]:
+    ) -> tuple[_Path, FloatArray, FloatArray] | None:
         """Some windows with given hidden states, which depend on the unknowns by `turn`.
 
         Returns:
-            The windows; the hidden states after them, and how these depend on the unknowns.
+            The windows; the hidden states after them, and how these depend on the unknowns. None
+            if a window diverges.
         """
         m, hidden = self._m, self._hidden
         initial, (error, slopes, ended, moved) = self._settled(parameters, rows, initial)
+        if not _finite(error, slopes):
+            return None
         tangent = self._tangent(slopes)
         by = slopes[..., m + hidden] @ turn
         by[..., :m] += slopes[..., :m]
@@ -266,7 +270,7 @@ class _ContinuedWindows:
         """Windows with their measured states moved by a Gauss-Newton step where it helps."""
         problem, found = self._problem, self._problem.simulated_to_next(parameters, rows, initial)
         error, slopes = found[:2]
-        if not (len(self._shown) and np.isfinite(slopes).all() and np.isfinite(error).all()):
+        if not (len(self._shown) and _finite(error, slopes)):
             return initial, found
         step = self._tangent(slopes).solve(error[..., None])[..., 0]
         size = np.sum(error**2, axis=1)
@@ -306,3 +310,7 @@ class _ContinuedWindows:
             jacobian=jacobian.reshape(*path.residual.shape, m),
             begun_anew=self._found,
         )
+
+
+def _finite(*values: FloatArray) -> bool:
+    return all(bool(np.isfinite(each).all()) for each in values)
