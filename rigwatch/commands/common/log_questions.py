@@ -40,7 +40,8 @@ def ask_for_logs(arguments: argparse.Namespace) -> None:
     if not logs:
         raise ModelError("found no logs, expected files such as run1.csv")
     arguments.data = [Path(log) for log in logs]
-    columns = read_table(arguments.data[0], ImportMapping()).names
+    names = arguments.columns.split(",") if arguments.columns else ()
+    columns = read_table(arguments.data[0], ImportMapping(columns=tuple(names))).names
     if not arguments.model:
         models = shipped_models()
         say(f"models: {', '.join(sorted(models))}; or a model file")
@@ -94,6 +95,9 @@ def _command(arguments: argparse.Namespace) -> str:
     """The command line of these arguments."""
     words = ["rigwatch", "study", "new", str(arguments.study), "--model", arguments.model]
     words += ["--data", *map(str, arguments.data)]
-    for option in ("map", "set"):
-        words += [word for text in getattr(arguments, option) for word in (f"--{option}", text)]
+    words += ["--healthy", *map(str, arguments.healthy)] if arguments.healthy else []
+    for option in ("map", "set", "time", "rate", "columns"):
+        given = getattr(arguments, option) or []
+        for each in given if isinstance(given, list) else [given]:
+            words += [f"--{option}", str(each)]
     return shlex.join(words)
