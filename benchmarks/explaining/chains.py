@@ -1,4 +1,4 @@
-"""Chains: several effects hidden at once in five kinds of machine, found step by step.
+"""Chains: several effects hidden at once in six kinds of machine, found step by step.
 
 A user's work is simulated: the log is imported as a study and explained, the effect named is added,
 and this is repeated until nothing is missing. If rivals are named and a hidden effect is among
@@ -36,6 +36,7 @@ CHAINS = {
     "pendulum": "coulomb+air_drag late_drive+coulomb+imbalance",
     "damper": "slider+hardening joint+orifice+preload",
     "tanks": "leak+dead_band saturation+late_pump+inlet",
+    "cascade": "saturation+inlet",
 }
 """Effects hidden in each machine at the same time."""
 SHARE = 0.1
@@ -43,6 +44,7 @@ SHARE = 0.1
 SHARES = {
     "pendulum": {"late_drive": 0.2},
     "tanks": {"leak": 0.3, "dead_band": 0.5, "saturation": 0.3, "late_pump": 0.3, "inlet": 0.3},
+    "cascade": {"saturation": 0.3, "inlet": 0.3},
 }
 NOISES = (0.002, 0.005, 0.02)
 """Standard deviation of the sensors' noise, relative to the rms of their signals."""

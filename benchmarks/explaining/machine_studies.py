@@ -18,6 +18,7 @@ STUDIES = {
     "damper": 'model = "damper"\n[derive]\nlow_pass = 20.0\n'
     'signals.velocity = { channel = "displacement", order = 1 }\n',
     "tanks": 'model = "tanks"\nhorizon = 150.0\nstart = { A1 = 0.0028, A2 = 0.0032 }\n',
+    "cascade": 'model = "cascade"\nstart = { A1 = 0.0031, A2 = 0.0026 }\n',
 }
 """Settings of each machine's study, without its recordings."""
 WITH_HEALTHY = ("oscillator",)

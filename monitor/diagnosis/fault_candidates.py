@@ -240,7 +240,7 @@ def _rivals(best: Suspect, rows: Sequence[Suspect]) -> str:
     named, more = best.alike[:6], len(best.alike) - 6
     listed = ", ".join(named) + (f" and {more} more" if more > 0 else "")
     if not best.family or not kin.issuperset(best.alike):
-        return f"; cannot be told from {listed}"
+        return f"; cannot be told from {listed}, so check these too"
     verb = "explains" if len(best.alike) == 1 else "explain"
     return (
         f"; {best.family} at {best.port} is settled, by which law is not: "
@@ -252,7 +252,7 @@ def _fit(row: Suspect) -> str:
     """An effect, its physics, and how well it explains the change."""
     physics = row.physics.strip().rstrip(".")
     plain = f" ({physics[0].lower()}{physics[1:]})" if physics else ""
-    share = f"explains {row.explained:.0%} of the energy of the residual's change"
+    share = f"explains {row.explained:.0%} of the change since healthy"
     return f"{row.label}{plain}: {share}, by chance {_chance(row.p_value)}"
 
 

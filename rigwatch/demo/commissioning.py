@@ -17,6 +17,7 @@ from rigwatch import physics, wire
 from rigwatch.demo.rig_file import MODEL, relative
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.typed_files import find_config
+from sim_plant.scenario import load_scenario
 
 RECORDINGS = {
     "chirp": "scenarios/commissioning_chirp.toml",
@@ -31,6 +32,12 @@ WHAT = {
 }
 """What each of them shows."""
 STEPS = len(RECORDINGS) + 2
+
+
+def known_friction() -> float:
+    """The dry friction of the third recording, which the monitor takes as its unit [N]."""
+    (event,) = load_scenario(find_config(RECORDINGS["friction"])).events
+    return event.value
 
 
 def ensure_model(config: Path, folder: Path, say: Callable[[str], None]) -> Path:

@@ -10,20 +10,27 @@ from dataclasses import dataclass
 from math import inf, isinf
 
 from rigwatch.demo.verdict import ALARM
-from rigwatch.wire.messages import PROBABLY_MISSING, Alarm, Event
+from rigwatch.wire.messages import PROBABLY_MISSING, Alarm, EstimateBlock, Event
 from sim_plant.scenario import Scenario
 
 ACTS = {
     "coulomb": ("dry friction of {value:g} N begins", "the friction ends"),
-    "actuator_gain": ("the valve's gain falls to {value:.0%}", "the valve's gain is whole again"),
+    "actuator_gain": (
+        "the valve's gain falls to {value:.0%}, which shows only while its voltage is far from 0",
+        "the valve's gain is whole again",
+    ),
 }
 NEUTRAL = {"coulomb": 0.0, "actuator_gain": 1.0}
 WHY_LATER = "later than the alarm: every known effect is compared with two seconds of samples"
+SIZE = "theta1"
+"""The monitor's estimate of dry friction, in units of that which it was commissioned with."""
 ENDED = ("normal", "cleared_unacknowledged")
 NAMELESS = "departure"
 """The alarm that reports a fault without naming it."""
 AFTER_EXPLAINED = 8.0
 """Time from the naming of dry friction to the end if its cause is told by then [s]."""
+NAMED = {NAMELESS: "alarm raised", "other_fault": "dry friction ruled out"}
+"""What an alarm tells at its time, if that is not the fault's name."""
 OF_THE_RIG = (NAMELESS, "dry_friction", "stiction", "other_fault")
 """Alarms that answer to what is done to the rig; others are about its measuring chain."""
 
@@ -60,6 +67,7 @@ class Narrator:
         scenario: the changes to the rig.
         say: called with each line.
         rig: the rig's configuration, for the commands that people are told.
+        known: the dry friction that the monitor was commissioned with [N].
         attended: people watch, so commands that a running rig answers are told.
 
     Attributes:
@@ -68,11 +76,17 @@ class Narrator:
     """
 
     def __init__(
-        self, scenario: Scenario, say: Callable[[str], None], rig: str, *, attended: bool = True
+        self,
+        scenario: Scenario,
+        say: Callable[[str], None],
+        rig: str,
+        *,
+        known: float,
+        attended: bool = True,
     ) -> None:
         self.alarms: list[Alarm] = []
         self.explained = False
-        self._attended = attended
+        self._attended, self._known, self._size = attended, known, 0.0
         self._say, self._config = say, rig
         self._rate = scenario.plant.sample_rate
         self._acts = acts(scenario)
@@ -118,11 +132,13 @@ class Narrator:
             wait = (self._next.seq - seq) / self._rate
             self._say(f"            the {which} fault comes in {wait:.0f} s; Ctrl-C ends the demo")
 
-    def judged(self, seq: int) -> None:
-        """Report the end of an alarm once the monitor is a second of samples past it.
+    def judged(self, block: EstimateBlock) -> None:
+        """Take estimates, and report the end of an alarm a second of samples before them.
 
         The monitor may lag behind the samples, and a name that follows a departure with it.
         """
+        self._size = float(block.column(SIZE).values[-1])
+        seq = block.seq + len(block)
         if self._ended is not None and seq > self._ended.seq + self._rate:
             self._tell_end()
 
@@ -161,6 +177,10 @@ class Narrator:
             found = event.text.rpartition("probably missing: ")[2]
             self._say(f"            probably missing in the rig's model: {found}")
             self._say(f"            ({WHY_LATER})")
+            if event.text.startswith(ALARM):
+                force = self._size * self._known
+                times = f"{self._size:.2f} times the {self._known:g} N of the third recording"
+                self._say(f"            measured friction: {force:.2f} N ({times})")
             effect = re.search(r"(\w+)@\w", found)  # an effect at a port is written effect@port
             if effect:
                 self._say(f"            more about it: $ rigwatch effects {effect[1]}")
@@ -185,7 +205,7 @@ class Narrator:
             return ""
         late = alarm.seq - self._last.seq
         onset = max(0, alarm.onset_seq - self._last.seq)
-        told = "alarm raised" if alarm.name == NAMELESS else "named"
+        told = NAMED.get(alarm.name, "named")
         return (
             f" (first sign {onset / self._rate * 1e3:.0f} ms after the fault began, "
             f"{told} at {late / self._rate * 1e3:.0f} ms)"

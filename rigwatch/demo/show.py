@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rigwatch.demo.commissioning import known_friction
 from rigwatch.demo.narrator import Narrator
 from rigwatch.demo.rig_file import relative
 from rigwatch.demo.verdict import Recording, complaints, read_recording
@@ -96,7 +97,9 @@ class Show:
         self._config = load_rig(rig)
         assert self._config.plant is not None
         scenario = load_scenario(self._config.plant.scenario)
-        self._narrator = Narrator(scenario, say, relative(self._rig), attended=attended)
+        self._narrator = Narrator(
+            scenario, say, relative(self._rig), known=known_friction(), attended=attended
+        )
         self._first = self._seen = 0
         self._up: subprocess.Popen[str] | None = None
 
@@ -144,7 +147,7 @@ class Show:
                     self._narrator.explain(event)
                 judged: list[EstimateBlock] = estimates.drain()
                 if judged and alarm is None:
-                    self._narrator.judged(judged[-1].seq + len(judged[-1]))
+                    self._narrator.judged(judged[-1])
                 blocks: list[SampleBlock] = samples.drain()
                 if blocks:
                     self._take(blocks)

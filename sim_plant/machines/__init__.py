@@ -1,4 +1,4 @@
-"""Machines of five kinds, each with effects that can be hidden in it, as plants to be explained.
+"""Machines of six kinds, each with effects that can be hidden in it, as plants to be explained.
 
 Each has its own equations and integrator and shares nothing with the models that are fitted to it.
 Inputs are held between samples, sensors have noise and finite resolution, and runs start at rest.

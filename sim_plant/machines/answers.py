@@ -46,8 +46,17 @@ RIGHT: dict[str, dict[str, tuple[str, ...]]] = {
         "late_pump": ("lag@pump", "delay@pump"),
         "inlet": ("constant_force@lower",),
     },
+    "cascade": {
+        "dead_band": ("dead_band@pump",),
+        "saturation": ("saturation@pump",),
+        "inlet": ("constant_force@lower",),
+        "late_pump": ("lag@pump", "delay@pump"),
+        "slow_level": ("lag@level_sensor", "delay@level_sensor", "lag@pump", "delay@pump"),
+        "spill": (),
+    },
 }
-"""Library names of each hidden effect; several if no recording can distinguish them.
+"""Library names of each hidden effect; several if no recording can distinguish them, none if no
+single effect describes it.
 
 In two tanks of known base area with holes of unknown size, a leak of the upper tank reduces the
 flow into the lower one by a fixed share. A wrong gain of either level sensor has the same effect:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigwatch.wire.arrays import FloatArray
-from sim_plant.machines import damper, motor, pendulum, tanks
+from sim_plant.machines import cascade, damper, motor, pendulum, tanks
 from sim_plant.oscillator import EFFECTS as OSCILLATOR_EFFECTS
 from sim_plant.oscillator import RATE as OSCILLATOR_RATE
 from sim_plant.oscillator import Hidden, oscillate
@@ -143,6 +143,10 @@ MACHINES: dict[str, Machine] = {
     "tanks": Machine(
         tanks.RATE, ("voltage_V", "level1_m", "level2_m"), 1, 0,
         tanks.EFFECTS, tanks.drive, _driven(tanks.run, tanks.EFFECTS, 2),
+    ),
+    "cascade": Machine(
+        cascade.RATE, ("voltage_V", "level_m"), 1, 0,
+        cascade.EFFECTS, cascade.drive, _driven(cascade.run, cascade.EFFECTS, 1),
     ),
 }  # fmt: skip
 """The machines by name."""

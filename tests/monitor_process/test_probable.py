@@ -94,7 +94,7 @@ def test_a_healthy_rig_leaves_nothing_to_be_named() -> None:
 def test_a_probability_is_told_as_once_in_so_many(p_value: float, words: str) -> None:
     row = Suspect("coulomb", "load", p_value, 0.99, 1, physics="Dry surfaces resist.")
     text = in_words([row])
-    share = "explains 99% of the energy of the residual's change"
+    share = "explains 99% of the change since healthy"
     assert f"coulomb@load (dry surfaces resist): {share}, {words}" in text
     assert ("cannot tell" in text) == (p_value > 0.01)
 
@@ -204,7 +204,7 @@ def test_friction_on_the_simulated_rig_is_named_after_its_alarm() -> None:
     text, standing = ranked(RIG, blocks)
     plain = "(dry surfaces resist sliding with a force that does not depend on speed)"
     assert f"probably missing: coulomb@load {plain}: explains " in text
-    assert "of the energy of the residual's change, by chance less than once in a million" in text
+    assert "of the change since healthy, by chance less than once in a million" in text
     assert any("probably missing: coulomb@load" in alarm.cause for alarm in standing)
 
 

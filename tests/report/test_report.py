@@ -161,6 +161,7 @@ def test_that_more_is_missing_than_the_effect_named_is_in_the_headline(study: St
     material = gather(study)
     found = replace(material.explanation, verdict="missing_effect", remains=0.63)
     more = ", and more than that: it leaves 63% of the error's energy"
+    more += ", for which no known effect is found yet"
     assert explanation_lines(found)[0] == f"verdict: an effect is missing{more}"
     assert headline(replace(material, explanation=found)).endswith(more)
     alone = replace(found, remains=0.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim_plant.machines import MACHINES, Machine, log, strength_for
+from sim_plant.machines import MACHINES, Machine, cascade, log, strength_for, tanks
 
 NEW = [name for name in MACHINES if name != "oscillator"]
 
@@ -57,9 +57,26 @@ def test_a_pendulum_hangs_where_torque_and_weight_balance():
     assert np.sin(out[-1, 0]) == pytest.approx(2.0 * CONSTANT / RESISTANCE / GRAVITY, rel=1e-4)
 
 
-def test_tanks_settle_where_what_comes_in_goes_out():
-    from sim_plant.machines.tanks import EFFECTS, FALL, HOLES, PUMP, run
+@pytest.mark.parametrize(
+    ("plant", "holes"),
+    [pytest.param(tanks, tanks.HOLES, id="tanks"),
+     pytest.param(cascade, cascade.HOLES[1:], id="cascade")],
+)  # fmt: skip
+def test_tanks_settle_where_what_comes_in_goes_out(plant, holes):
+    out = np.empty((3000, len(holes)))
+    plant.run(np.full(3000, 5.0), np.zeros(len(plant.EFFECTS)), out)
+    left = np.array(holes) * np.sqrt(2 * plant.FALL * out[-1])
+    np.testing.assert_allclose(left, plant.PUMP * 5.0, rtol=1e-4)
 
-    out = np.empty((3000, 2))
-    run(np.full(3000, 5.0), np.zeros(len(EFFECTS)), out)
-    np.testing.assert_allclose(np.array(HOLES) * np.sqrt(2 * FALL * out[-1]), PUMP * 5.0, rtol=1e-4)
+
+def test_a_tank_that_nothing_fills_runs_dry_as_its_jet_slows():
+    # A·dh/dt = −a·√(2·g·h): the speed of the jet falls linearly, to zero and no further.
+    out, (upper, lower) = np.empty((60, 1)), zip(cascade.HOLES, cascade.GROUND, strict=True)
+    cascade.run(np.zeros(60), np.zeros(len(cascade.EFFECTS)), out)
+    speed = np.sqrt(2 * cascade.FALL * out[:, 0])
+    hole, ground = upper
+    empty = cascade.PUMP * cascade.RESTING / hole * ground / (cascade.FALL * hole)
+    alone = speed[int(np.ceil(empty * cascade.RATE)) :][:3]
+    slows = cascade.FALL * lower[0] / lower[1] / cascade.RATE
+    np.testing.assert_allclose(-np.diff(alone), slows, rtol=1e-6)
+    assert speed[-1] == 0.0

@@ -3,6 +3,7 @@
 from rigwatch.commands.common.batch_options import add_many, add_on, add_where, run_many, the_one
 from rigwatch.commands.common.drawing import ready_to_draw, show_until_closed
 from rigwatch.commands.common.log_arguments import add_log_columns
+from rigwatch.commands.common.log_questions import ask_for_logs, can_ask
 from rigwatch.commands.common.many_studies import add_studies, run_studies, the_study
 from rigwatch.commands.common.marks import marks_of
 from rigwatch.commands.common.numbers import PORT, POSITIVE, number, whole
@@ -29,6 +30,8 @@ __all__ = [
     "add_span",
     "add_studies",
     "add_where",
+    "ask_for_logs",
+    "can_ask",
     "check_folder",
     "damage_lines",
     "file_or_name",

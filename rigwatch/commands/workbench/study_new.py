@@ -6,7 +6,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands.common import add_log_columns, file_or_name, print_json, say
+from rigwatch.commands.common import (
+    add_log_columns,
+    ask_for_logs,
+    can_ask,
+    file_or_name,
+    print_json,
+    say,
+)
 
 if TYPE_CHECKING:
     from rigwatch.workbench.steps import Logs
@@ -14,6 +21,7 @@ if TYPE_CHECKING:
 _NUMBER = re.compile(r"[A-Za-z_][\w.]*(\s*\[[^\]]+\])?")
 HELP = "create a study from logs and a model, or from a template"
 EXAMPLE = """\
+  rigwatch study new drive
   rigwatch study new drive --data run1.csv run2.csv --model motor --set R=2.0 --set K=0.06
   rigwatch study new drive --data a.csv b.csv --model motor --set a:J=2e-4 --set b:J=5e-4
   rigwatch study new servo --data *.json --model servo.toml --set kp=kp --set m=mass[kg]
@@ -24,9 +32,13 @@ EXAMPLE = """\
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the action."""
     parser.add_argument("study", type=Path, help="the study's folder")
-    given = parser.add_mutually_exclusive_group(required=True)
+    given = parser.add_mutually_exclusive_group()
     given.add_argument(
-        "--data", type=Path, nargs="+", metavar="LOG", help="logs of the machine: CSV, MAT, …"
+        "--data",
+        type=Path,
+        nargs="+",
+        metavar="LOG",
+        help="logs of the machine: CSV, MAT, …; without --data and --template a terminal is asked",
     )
     given.add_argument(
         "--template",
@@ -64,6 +76,8 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.workbench.study import create, ledger
 
     remarks: list[str] = []
+    if not arguments.data and not arguments.template:
+        _ask(arguments)
     if arguments.data:
         study, remarks = study_from_logs(arguments.study, _logs(arguments))
     else:
@@ -79,6 +93,21 @@ def run(arguments: argparse.Namespace) -> int:
     rarer = f", {len(elective)} rarer ones with whole_library = true" if elective else ""
     print(f"  {len(tried)} effects suit its ports{rarer}; next: rigwatch explain {study.folder}")
     return 0
+
+
+def _ask(arguments: argparse.Namespace) -> None:
+    """Ask for logs, model and columns.
+
+    Raises:
+        ModelError: nobody can be asked.
+    """
+    from rigwatch.wire.errors import ModelError
+    from rigwatch.workbench.study import check_new
+
+    if not can_ask():
+        raise ModelError("found neither --data nor --template, expected one of them")
+    check_new(arguments.study)
+    ask_for_logs(arguments)
 
 
 def _logs(arguments: argparse.Namespace) -> "Logs":

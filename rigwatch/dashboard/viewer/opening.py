@@ -65,7 +65,7 @@ def _start(
     port = settings.grpc_port if kind == "web" or not answers(settings.grpc_port) else 0
     viewer = Viewer(kind, port, settings.web_port, memory).await_answer(tick)
     if kind == "web":
-        say(f"open {viewer.web_url} in a browser on this machine")
+        say(f"no page opens by itself: open {viewer.web_url} in a browser on this machine")
     return viewer
 
 

@@ -12,13 +12,8 @@ is fitted once over a horizon derived from the outputs.
 A drive that steps once a minute meets windows of a minute always at the same place. If that is a
 window's beginning or end, the window's own initial state takes up all that a lag does after a step.
 The horizon is then shortened until the steps fall inside the windows.
-
-A state that no channel shows may take up what the model lacks: to begin with it is free in each
-window, and windows shorter than its time constant may lead no two starts to the same optimum from
-which it could continue. Longer windows, of which fewer remain, are then tried.
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +21,6 @@ from msgspec import structs
 
 from rigwatch.physics.engine.fit import Recording, filled
 from rigwatch.physics.engine.score import autocorrelation, first_below
-from rigwatch.physics.engine.search import hidden_states
 from rigwatch.wire.arrays import BoolArray, ComplexArray, FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, predicts_along_motion, prepare, quiet_scale
@@ -42,12 +36,6 @@ MOST_PERIODS = 12.0
 WINDOWS, FEWEST_WINDOWS = 10, 4
 """Minimum number of windows in the shortest recording, and if they would not span two periods."""
 LIMITED = ", limited to a tenth of the shortest recording"
-LENGTHENED = (
-    ", at most {share} of the shortest recording: over a tenth the fit does not converge, as"
-    " initial values of {states} stand in for what the model lacks"
-)
-FEWER_WINDOWS = {FEWEST_WINDOWS: "a quarter", 2: "half"}
-"""Windows of the shortest recording that are tried where a fit over more does not converge."""
 TWO_PERIODS = ", limited to two periods as the shortest recording holds few"
 FEWEST = 20
 """Minimum number of samples in a window."""
@@ -91,23 +79,6 @@ def with_horizon(study: Study) -> Study:
     bound = "" if chosen >= constant else LIMITED if chosen <= longest else TWO_PERIODS
     chosen, shortened = _within_windows(chosen, data, needed)
     return _with_source(study, f"{name}{bound}{shortened}", chosen)
-
-
-def with_longer_horizons(study: Study, fitted: Fitted, data: Data) -> Iterator[Study]:
-    """The study with longer horizons if those that were chosen leave its fit without an optimum.
-
-    Args:
-        study: with its horizon chosen from the data.
-        fitted: its model, fitted over this horizon.
-        data: the recordings of the fit.
-    """
-    ended, hidden = fitted.convergence, hidden_states(fitted.compiled.system)
-    if ended is None or ended.converged or not hidden or LIMITED not in study.horizon_from:
-        return
-    source = study.horizon_from.partition(LIMITED)[0]
-    for count, share in FEWER_WINDOWS.items():
-        told = source + LENGTHENED.format(share=share, states=", ".join(hidden))
-        yield _with_source(study, told, _shortest(data) / count)
 
 
 def with_horizon_of(study: Study, other: Study) -> Study:

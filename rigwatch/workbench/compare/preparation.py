@@ -7,11 +7,7 @@ In order: signals on one time grid, holds of the inputs, results from the health
 from dataclasses import dataclass, replace
 
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.workbench.compare.horizon import (
-    with_horizon,
-    with_horizon_of,
-    with_longer_horizons,
-)
+from rigwatch.workbench.compare.horizon import with_horizon
 from rigwatch.workbench.compare.row_order import with_row_order
 from rigwatch.workbench.data import (
     Data,
@@ -62,12 +58,7 @@ def open_bench(study: Study) -> Bench:
     Raises:
         ModelError: data have changed, or do not suit the model.
     """
-    bench = bench_of(*prepared(study))
-    for longer in with_longer_horizons(bench.study, bench.base, bench.data):
-        other = bench_of(*prepared(with_horizon_of(study, longer)))
-        if other.base.convergence is not None and other.base.convergence.converged:
-            return other
-    return bench
+    return bench_of(*prepared(study))
 
 
 def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:

@@ -75,17 +75,16 @@ def shows_little_of_it(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
 
 
 def remaining_error(base: Fitted, row: Ranked, floor: NoiseFloor) -> str:
-    """The error that an effect leaves above the floor, in words; empty at the noise floor."""
+    """`remaining_share` in words, and of which error; empty at the noise floor."""
     assert row.fitted is not None
-    text = ""
-    for share, of, fitted in (
-        (_remaining_held_out(base, row, floor), "error", row.fitted.held_out),
-        (_remaining_in_training(base, row, floor), "training error", row.fitted.train),
-    ):
-        if share and not text:
-            times = floor.ratio(fitted)
-            text += f"; {share:.0%} of the {of}'s energy remains, {times:.2g} times the noise floor"
-    return text
+    held_out = _remaining_held_out(base, row, floor)
+    train = _remaining_in_training(base, row, floor)
+    share, of, fitted = held_out, "error", row.fitted.held_out
+    if train > held_out:
+        share, of, fitted = train, "training error", row.fitted.train
+    times = floor.ratio(fitted)
+    left = f"; {share:.0%} of the {of}'s energy remains, {times:.2g} times the noise floor"
+    return left if share else ""
 
 
 def _remaining_held_out(base: Fitted, row: Ranked, floor: NoiseFloor) -> float:

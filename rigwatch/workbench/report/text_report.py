@@ -145,7 +145,10 @@ def more_missing(found: Explanation) -> str:
     """How much more than the effect that it names is missing, in words; empty if nothing is."""
     if found.verdict != "missing_effect" or not found.remains:
         return ""
-    return f", and more than that: it leaves {found.remains:.0%} of the error's energy"
+    return (
+        f", and more than that: it leaves {found.remains:.0%} of the error's energy, for which no"
+        " known effect is found yet"
+    )
 
 
 def _named_lines(found: Explanation) -> list[str]:

@@ -6,6 +6,7 @@ from rigwatch.workbench.steps.change import add, check_effect, learn, learn_text
 from rigwatch.workbench.steps.from_logs import study_from_logs
 from rigwatch.workbench.steps.imported_logs import Logs
 from rigwatch.workbench.steps.ledger_replay import replay
+from rigwatch.workbench.steps.log_columns import suggested
 from rigwatch.workbench.steps.model_handover import (
     ModelHandover,
     Rehearsal,
@@ -49,6 +50,7 @@ __all__ = [
     "signals",
     "stages",
     "study_from_logs",
+    "suggested",
     "take_base",
     "try_add",
     "try_effect",

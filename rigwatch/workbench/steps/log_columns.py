@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -65,6 +66,27 @@ def matched(
         when, more = _as_time(time, dated)
         remarks += more
     return Matched(found, when, rates, tuple(remarks))
+
+
+def suggested(columns: Sequence[str], model: Model) -> dict[str, str]:
+    """The "column[unit]" of each channel of a model that the headers alone tell.
+
+    Args:
+        columns: of the log.
+        model: the model whose signals are looked for.
+    """
+    headers = [read_header(column) for column in columns]
+    time = _time_of(headers, (), model, counted=False)
+    free, found = [h for h in headers if h is not time], dict[str, str]()
+    for name, signal in {**model.inputs, **model.outputs}.items():
+        channel = signal.channel or name
+        column = _column(name, channel, signal, free)
+        if column is None:
+            continue
+        free.remove(column)
+        with suppress(ModelError):
+            found[channel] = f"{column.column}[{_unit(column, channel, signal)[0]}]"
+    return found
 
 
 def _read(

@@ -14,7 +14,6 @@ from rigwatch.workbench.compare import (
     Comparison,
     bench_of,
     comparison,
-    open_bench,
     prepared,
 )
 from rigwatch.workbench.study import Study
@@ -65,10 +64,6 @@ def stages(study: Study) -> list[Stage]:
     Raises:
         ModelError: data have changed, or do not suit the model.
     """
-    if not study.file.effects:
-        # The fit itself may ask for a longer horizon; the first effect writes it to the study.
-        bench = open_bench(study)
-        return [Stage("", bench, comparison(bench))]
     study, data, scale = prepared(study)
     effects, found = study.file.effects, []
     for count in range(len(effects) + 1):

@@ -4,7 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
+from rigwatch.physics.engine.equations.model import model_text
 from rigwatch.workbench.explain.explain import explain
+from sim_plant.machines import MACHINES, log, strength_for
 from tests.workbench.fits.test_horizon import CASCADE
 from tests.workbench.machine import studied
 
@@ -34,3 +36,18 @@ def test_a_dead_band_is_named_although_an_offset_is_like_it_to_first_order(tmp_p
     assert found.verdict == "missing_effect"
     assert found.ranking[0].effect == "dead_band"
     assert 0.98 < found.ranking[0].parameters["b"].value < 1.02
+
+
+def test_it_is_named_in_a_plant_that_is_integrated_another_way(tmp_path: Path) -> None:
+    plant = MACHINES["cascade"]
+    hidden = {"dead_band": strength_for(plant, "dead_band", 0.5, seed=1)}
+    tables = [log(plant, hidden, 0.005, seed) for seed in (1, 1001)]
+    named = [{"voltage": t["voltage_V"], "level": t["level_m"]} for t in tables]
+    study = studied(
+        tmp_path, model_text("cascade"), named[:1], named[1:], {"voltage": "V", "level": "m"},
+        "start = { A1 = 0.0031, A2 = 0.0026 }", [plant.rate] * 2,
+    )  # fmt: skip
+    found = explain(study)
+    assert (found.verdict, found.ranking[0].effect) == ("missing_effect", "dead_band")
+    strength = found.ranking[0].parameters["b"].value
+    assert abs(strength / hidden["dead_band"] - 1) < 0.05

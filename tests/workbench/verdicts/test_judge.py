@@ -220,6 +220,15 @@ def test_an_effect_that_leaves_most_is_not_the_answer() -> None:
     assert judge(base(3.0), [best(error=2.7)], QUIET).word == "unknown_effect"
 
 
+def test_of_training_and_held_out_error_the_one_that_keeps_more_is_told() -> None:
+    named = best(error=1.5)
+    assert named.fitted is not None
+    named.fitted = replace(named.fitted, train=base(2.0).train)
+    assert remaining_share(base(), named, QUIET) == pytest.approx(0.375)
+    said = judge(base(), [named], QUIET).text
+    assert "; 38% of the training error's energy remains, 2 times the noise floor" in said
+
+
 @pytest.mark.parametrize(
     ("train", "like", "word"),
     [

@@ -5,11 +5,7 @@ search (ShortHorizons, WholeRuns) ──attempts──▶ multi_start_fit ──
 
 from rigwatch.physics.engine.search.continued_fit import fit_continued
 from rigwatch.physics.engine.search.convergence import Convergence, convergence
-from rigwatch.physics.engine.search.hidden_states import (
-    continued_spread,
-    has_hidden_states,
-    hidden_states,
-)
+from rigwatch.physics.engine.search.hidden_states import continued_spread, has_hidden_states
 from rigwatch.physics.engine.search.multi_start_fit import multi_start_fit
 from rigwatch.physics.engine.search.promised_step import kept_promise
 from rigwatch.physics.engine.search.short_horizons import ShortHorizons
@@ -23,7 +19,6 @@ __all__ = [
     "convergence",
     "fit_continued",
     "has_hidden_states",
-    "hidden_states",
     "kept_promise",
     "multi_start_fit",
 ]

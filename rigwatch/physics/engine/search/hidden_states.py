@@ -13,13 +13,7 @@ from rigwatch.physics.engine.search.convergence import spread
 
 def has_hidden_states(system: System) -> bool:
     """Whether the model has a state that no channel shows."""
-    return bool(hidden_states(system))
-
-
-def hidden_states(system: System) -> list[str]:
-    """The model's states that no channel shows."""
-    shown = shown_states(system)
-    return [name for at, name in enumerate(system.model.states) if at not in shown]
+    return not set(range(len(system.model.states))) <= shown_states(system)
 
 
 def continued_spread(found: Fit, recording: Recording, horizon: int, substeps: int) -> float:
