@@ -6,13 +6,22 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
+import msgspec
 import pytest
 
+from daq.__main__ import acquire
+from daq.adapters import adapter_for
 from daq.known_device import read_devices
-from rigwatch.wire.host import free_port
+from rigwatch.wire.access import signer_of
+from rigwatch.wire.bus import DeviceRequest, accept_device, ask_for_device
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.host import Heartbeat, free_port
+from rigwatch.wire.messages import HEALTH, SAMPLES
+from rigwatch.wire.rig_config import MonitorSection, SecuritySection
 from sim_plant.serve import Device, ModbusServer, RegisterBank
 from sim_plant.serve.pty_bridge import PtyBridge
 from tests.bus.rig import answers, rigwatch
+from tests.daq.rig import config_of
 from tests.faults.field import Field, WaveSource
 from tests.waiting import eventually
 
@@ -110,11 +119,57 @@ def test_the_link_alarm_names_the_other_device_and_none_of_its_samples_is_taken(
         assert {block.boot for block in rig.samples} == {right.boot}
 
 
+@contextmanager
+def acquiring(section: str, journal: Path, network: MemoryNetwork) -> Iterator[None]:
+    """Data acquisition of a device, in a thread, on a bus in memory."""
+    monitor = MonitorSection(model="model.toml", journal=str(journal))
+    config = msgspec.structs.replace(config_of(section), monitor=monitor)
+    bus, stop = network.bus(config.rig.id, "daq"), threading.Event()
+    adapter = adapter_for(config.daq.device, config.channels)
+    arguments = (config, adapter, bus, stop, Heartbeat("daq", {}))
+    thread = threading.Thread(target=acquire, args=arguments, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
+
+
 @pytest.mark.parametrize("over", [OverTcp, OverRtu])
-def test_the_first_device_stays_the_rigs_until_a_person_accepts_another(
+def test_on_either_line_the_device_that_was_met_first_is_checked(
     over: type[Place], tmp_path: Path
 ) -> None:
     place, right, other = over(tmp_path), device(), device()
+    network = MemoryNetwork()
+    ann = network.bus("test", "accept-1", signer_of(SecuritySection(), ""))
+    samples, told = ann.subscribe_lossy(SAMPLES), ann.subscribe(HEALTH)
+    boots, texts = set[int](), list[str]()
+
+    def heard(boot: int) -> bool:
+        boots.update(block.boot for block in samples.drain())
+        return boot in boots
+
+    def refused(found: str, expected: str) -> bool:
+        texts.extend(health.text for health in told.drain())
+        last = texts[-1] if texts else ""
+        return "another device" in last and -1 < last.find(found) < last.find(expected)
+
+    with acquiring(place.section, tmp_path / "alarms.jsonl", network):
+        with place.served(right, RIGHT):
+            eventually(lambda: heard(right.boot), "its samples")
+        with place.served(other, OTHER):
+            eventually(lambda: refused(OTHER, RIGHT), "the other is refused")
+            assert not heard(other.boot)
+            asked = DeviceRequest(ask_for_device(ann).answers, "ann", "exchanged")
+            assert accept_device(ann, asked).done
+            eventually(lambda: heard(other.boot), "its samples, once it is accepted")
+        with place.served(right, RIGHT):
+            eventually(lambda: refused(RIGHT, OTHER), "the one before is another now")
+
+
+def test_the_first_device_stays_the_rigs_until_a_person_accepts_another(tmp_path: Path) -> None:
+    place, right, other = OverTcp(tmp_path), device(), device()
     with Field(tmp_path, place.section) as rig:
         with place.served(right, RIGHT):
             rig.start("daq", "monitor")
