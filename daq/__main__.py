@@ -11,6 +11,8 @@ from pathlib import Path
 from daq.acquisition import Acquisition
 from daq.adapter import Adapter
 from daq.adapters import adapter_for
+from daq.device_desk import DeviceDesk
+from daq.known_device import KnownDevice, device_file
 from daq.publisher import Publisher
 from daq.supervisor import Supervisor
 from daq.turns import Turns
@@ -43,15 +45,31 @@ class Chain:
         self.acquisition = Acquisition(config, adapter.clock_rate)
         self._publisher = Publisher(bus, SampleRing(bus, config.daq.ring))
         self._adapter, self._pulse = adapter, pulse
+        self._known = _checked(config, adapter, self.acquisition.source)
+        self._desk = DeviceDesk(bus, self._known, config.bus.security) if self._known else None
 
     def step(self, wait: float) -> None:
         """Read for at most `wait` [s] and publish what comes of it."""
         for raw in self.device.read(wait):
             self._publisher.publish(self.acquisition.update(raw))
         link, counters = self.device.link, self._adapter.counters()
+        if self._known and self._desk:
+            self._publisher.publish(self._known.events())
+            counters = {**counters, **self._desk.counters}
         self._publisher.publish(self.acquisition.tick(time.monotonic_ns(), link, counters))
         waits = "" if link.connected and not link.text else link.text or "the device is not open"
         self._pulse.advance(self.acquisition.samples, waits)
+
+
+def _checked(config: RigConfig, adapter: Adapter, source: str) -> KnownDevice | None:
+    """The rig's device as it is known, which the adapter checks; None where nothing is checked."""
+    check_against = getattr(adapter, "check_against", None)
+    named = getattr(config.daq.device, "identity", "")
+    if check_against is None or named or config.daq.any_device:
+        return None
+    known = KnownDevice(source, device_file(config))
+    check_against(known)
+    return known
 
 
 def acquire(

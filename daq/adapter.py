@@ -47,8 +47,22 @@ class RawBlock:
         return len(self.seq)
 
 
+class Known(Protocol):
+    """The device of a rig, which an adapter compares with the one that answers."""
+
+    @property
+    def expected(self) -> str:
+        """What the rig's device tells of itself; empty if it is not known."""
+
+    def admits(self, identity: str) -> bool:
+        """Whether a device that tells this is the rig's; empty for one that tells nothing."""
+
+
 class Adapter(Protocol):
     """One device: opened, read, and after an error closed and reopened.
+
+    An adapter whose device tells who it is may have a method `check_against(known: Known)`, called
+    before the device is opened: the samples of a device that is not admitted must not be returned.
 
     Attributes:
         clock_rate: device microseconds per host microsecond; 1 except in replays.

@@ -9,7 +9,6 @@ import logging
 import os
 import select
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import serial
@@ -17,6 +16,7 @@ from pymodbus import FramerType
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.exceptions import ConnectionException, ModbusException
 
+from daq.adapters.identification import Identification, NoIdentificationError, Objects
 from daq.adapters.modbus_poll import ModbusAdapter, RefusedError
 from daq.adapters.serial_line import first_that_opens
 from rigwatch.wire.errors import DeviceError, ModbusError
@@ -35,6 +35,8 @@ _CODES = {
     11: "gateway: the unit does not answer",
 }
 _REPEATABLE = (5, 6)
+_NONE_THERE = (1, 2, 3)
+"""Exception codes of a device that has no identification; after others it may be asked again."""
 _ALL_OBJECTS, _MOST_ANSWERS = 3, 8
 """Read code for basic, regular and extended objects; answers over which they may be divided."""
 
@@ -87,11 +89,12 @@ class PymodbusRegisters:
         self._check(reply, count)
         return list(reply.registers)
 
-    def identification(self) -> str:
-        """The texts by which the device identifies itself (function 43/14), in order.
+    def identification(self) -> Objects:
+        """The texts by which the device identifies itself (function 43/14), by their number.
 
         Raises:
-            ModbusError: no valid answer, or the device has no identification.
+            NoIdentificationError: the device answers that it has none.
+            ModbusError: no valid answer.
         """
         found: dict[int, str] = {}
         first = 0
@@ -103,22 +106,19 @@ class PymodbusRegisters:
             except Exception as error:
                 raise ModbusError(f"{self._where}: no identification in time") from error
             if reply.isError():
-                raise RefusedError(f"{self._where}: the device has no identification (43/14)")
+                raise self._unidentified(int(getattr(reply, "exception_code", 0)))
             found |= {number: _as_text(text) for number, text in reply.information.items()}
             if not reply.more_follows or reply.next_object_id <= first:
                 break
             first = reply.next_object_id
-        return ", ".join(found[number] for number in sorted(found) if found[number])
+        return found
 
-    def check_identity(self, wanted: str) -> None:
-        """Check that the device's identification has the text `wanted`; "" for any device.
-
-        Raises:
-            RefusedError: it has not, or there is none.
-            ModbusError: no valid answer.
-        """
-        if wanted and wanted not in (found := self.identification()):
-            raise RefusedError(f"{self._where}: another device, {found!r}, expected {wanted!r}")
+    def _unidentified(self, code: int) -> ModbusError:
+        """The error for an exception code in place of an identification."""
+        if code in _NONE_THERE:
+            text = "the device has no identification (43/14)"
+            return NoIdentificationError(f"{self._where}: {text}")
+        return ModbusError(f"{self._where}: no identification, {_CODES.get(code, 'unknown')}")
 
     def close(self) -> None:
         """Close the connection."""
@@ -181,7 +181,7 @@ def tcp(section: ModbusSection, channels: tuple[ChannelSection, ...]) -> ModbusA
             raise DeviceError(f"{where}: no answer")
         return client
 
-    return _adapter(PymodbusRegisters(make, section.unit, where), section, len(channels))
+    return _adapter(PymodbusRegisters(make, section.unit, where), section, len(channels), where)
 
 
 def rtu(section: ModbusRtuSection, channels: tuple[ChannelSection, ...]) -> ModbusAdapter:
@@ -197,11 +197,14 @@ def rtu(section: ModbusRtuSection, channels: tuple[ChannelSection, ...]) -> Modb
     registers = PymodbusRegisters(
         lambda: first_that_opens(section.port, opened), section.unit, section.port
     )
-    return _adapter(registers, section, len(channels))
+    return _adapter(registers, section, len(channels), section.port)
 
 
 def _adapter(
-    registers: PymodbusRegisters, section: ModbusSection | ModbusRtuSection, channels: int
+    registers: PymodbusRegisters,
+    section: ModbusSection | ModbusRtuSection,
+    channels: int,
+    where: str,
 ) -> ModbusAdapter:
-    check = partial(registers.check_identity, section.identity)
-    return ModbusAdapter(registers, channels, section.polls, section.word_order, check=check)
+    who = Identification(registers.identification, section.identity, where)
+    return ModbusAdapter(registers, channels, section.polls, section.word_order, who=who)

@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from daq.adapter import RawBlock
+from daq.adapter import Known, RawBlock
 from rigwatch.wire.device import HEADER_LENGTH, Header, WordOrder, decode_header, decode_slots
 from rigwatch.wire.errors import DeviceError, ModbusError
 
@@ -37,6 +37,19 @@ class Registers(Protocol):
         """Close; does nothing if closed."""
 
 
+class Who(Protocol):
+    """Checks which device answers.
+
+    Attributes:
+        known: the rig's device, if it is to be checked.
+    """
+
+    known: Known | None
+
+    def check(self) -> None:
+        """Raises `RefusedError` if another device answers, `ModbusError` if it cannot be told."""
+
+
 class RefusedError(ModbusError):
     """The device answers with an exception code that retrying does not cure."""
 
@@ -49,8 +62,7 @@ class ModbusAdapter:
         channels: number of channels it must have.
         polls: polls per second.
         order: which 16-bit half of a 32-bit value comes first.
-        check: called when the device is connected and when it has started anew; raises
-            `RefusedError` if it is another one.
+        who: asked when the device is connected and when it has started anew.
         clock: monotonic time [ns].
         sleep: waits for a number of seconds.
 
@@ -67,7 +79,7 @@ class ModbusAdapter:
         polls: float = 32.0,
         order: WordOrder = "big",
         *,
-        check: Callable[[], None] = lambda: None,
+        who: Who | None = None,
         clock: Callable[[], int] = time.monotonic_ns,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
@@ -75,7 +87,7 @@ class ModbusAdapter:
         self._channels = channels
         self._period_ns = round(1e9 / polls)
         self._order: WordOrder = order
-        self._check = check
+        self._who = who
         self._clock = clock
         self._sleep = sleep
         self._next_poll = 0
@@ -85,6 +97,11 @@ class ModbusAdapter:
         self._backwards = 0
         self._counts = Counter({"polls": 0, "failed_polls": 0})
         self.trouble = ""
+
+    def check_against(self, known: Known) -> None:
+        """Check from now on that the device is the one that is known."""
+        if self._who is not None:
+            self._who.known = known
 
     def open(self) -> None:
         """Connect, and check identification, word order and channels.
@@ -128,6 +145,10 @@ class ModbusAdapter:
     def counters(self) -> Mapping[str, float]:
         """Number of polls, and of failed polls."""
         return dict(self._counts)
+
+    def _check(self) -> None:
+        if self._who is not None:
+            self._who.check()
 
     def _fail(self, error: ModbusError | DeviceError, *, has_read: bool) -> None:
         """Count a failed poll; an error that lasts is raised by the next one that reads nothing."""

@@ -76,9 +76,10 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "link",
         "critical",
         "nothing connects the monitor with the device any more",
-        "The reason names what is away. The device: check its power, the cable and the port. The "
-        "router or data acquisition: check that it runs (`rigwatch doctor CONFIG`). The connection "
-        "is restored by itself; lost samples are counted.",
+        "The reason names what is away. The device: check its power, the cable and the port. "
+        "Another device: put the right one back, or `rigwatch accept CONFIG`. The router or data "
+        "acquisition: check that it runs (`rigwatch doctor CONFIG`). The connection is restored by "
+        "itself; lost samples are counted.",
         _AT_ONCE,
     ),
     AlarmKind(

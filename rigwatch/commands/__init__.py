@@ -47,6 +47,7 @@ COMMANDS: dict[str, str] = {
     "fleet": "processes.fleet",
     "alarms": "alarms.alarms",
     "ack": "alarms.ack",
+    "accept": "alarms.accept",
     "keys": "keys.keys",
     "doctor": "processes.doctor",
     "dashboard": "processes.dashboard",

@@ -4,6 +4,7 @@ configuration   every process      a value that an earlier version took and this
 model           monitor            keys that have come since it was written
 journal         monitor            the same, and lines that were torn
 position        monitor            damaged, or beyond what a device can have sent
+device          daq                damaged
 positions       recorder           damaged
 session         recorder           segments without an end, of a recorder that was killed
 unfinished      every process      what a process that was killed had begun to write
@@ -13,10 +14,12 @@ import os
 import re
 import time
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from functools import partial
 from glob import escape
 from pathlib import Path
 
+from daq.known_device import DamagedError, device_file, read_devices
 from monitor.alarms import journal_text, read_journal
 from monitor.detectors import detectors_of
 from monitor.model import model_text, model_versions
@@ -24,7 +27,7 @@ from monitor.process import stored_position, suitable_model
 from rigwatch.doctor.kept import Kept
 from rigwatch.recorder import POSITIONS, load_positions, sessions_of
 from rigwatch.wire.delivery import LARGEST_SEQ
-from rigwatch.wire.errors import ConfigError, RigwatchError
+from rigwatch.wire.errors import ConfigError, RigwatchError, reason_of
 from rigwatch.wire.host import replace_file
 from rigwatch.wire.new_file import PART, left_behind, new_file
 from rigwatch.wire.rig_config import RigConfig, load_rig
@@ -60,6 +63,8 @@ def kept_files(config: RigConfig, path: Path) -> Iterator[Kept]:
             journal = Path(config.monitor.journal)
             yield from _journal(journal)
             yield from _position(journal.with_name(f"{journal.name}.position"))
+    if file := device_file(config):
+        yield from _device(file)
     if config.recorder is not None:
         yield from _recordings(Path(config.recorder.folder), config.rig.id)
     yield from _unfinished(config, path)
@@ -134,6 +139,24 @@ def _position(path: Path) -> Iterator[Kept]:
         yield Kept("position", path, "none yet")
     else:
         yield Kept("position", path, "it is damaged", "warn", _ASIDE, path.unlink)
+
+
+def _device(path: Path) -> Iterator[Kept]:
+    """The device that daq has met; a file that is set aside lets it learn one anew."""
+    try:
+        devices = read_devices(path)
+    except DamagedError:
+        change = "set it aside; the device that answers next is learnt"
+        yield Kept("device known", path, "it is damaged", "warn", change, path.unlink)
+    except OSError as error:
+        yield Kept("device known", path, reason_of(error), "fail")
+    else:
+        if devices:
+            last = devices[-1]
+            day = datetime.fromtimestamp(last.t_ns / 1e9, UTC).strftime("%Y-%m-%d")
+            how = f"accepted by {last.user}" if last.user else "as first met"
+            told = repr(last.identity) if last.identity else "tells no identification"
+            yield Kept("device known", path, f"{told}, {how} on {day}")
 
 
 def _recordings(root: Path, rig: str) -> Iterator[Kept]:

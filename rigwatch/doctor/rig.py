@@ -12,7 +12,14 @@ from rigwatch.doctor.kept import mended, users_of
 from rigwatch.wire.access import days_left, ending_soon, in_force, key_files, read_register
 from rigwatch.wire.errors import ConfigError, KeysError
 from rigwatch.wire.host import endpoint_address, is_free
-from rigwatch.wire.rig_config import ModbusRtuSection, RigConfig, SerialSection, load_rig
+from rigwatch.wire.rig_config import (
+    ModbusRtuSection,
+    ModbusSection,
+    PluginSection,
+    RigConfig,
+    SerialSection,
+    load_rig,
+)
 
 LOOPBACK = "127.0.0.1"
 
@@ -127,10 +134,27 @@ def check_ports(config: RigConfig) -> Iterator[Finding]:
 
 
 def check_device(config: RigConfig) -> Iterator[Finding]:
-    """The serial line exists and may be used; a simulated rig makes its own."""
+    """The serial line exists and may be used, as a simulated rig makes its own; who is told."""
     device = config.daq.device
+    yield Finding("identity", "ok", _told_of(config))
     if isinstance(device, SerialSection | ModbusRtuSection) and config.plant is None:
         yield check_serial(device.port)
+
+
+def _told_of(config: RigConfig) -> str:
+    """Whether another device in the place of the right one would be noticed."""
+    device = config.daq.device
+    if isinstance(device, PluginSection):
+        return f"the adapter {device.name} decides whether another device is noticed"
+    if not isinstance(device, ModbusSection | ModbusRtuSection):
+        return "this device does not tell who it is: another one in its place is not noticed"
+    if device.identity:
+        return f"only a device that tells {device.identity!r} is read"
+    if config.daq.any_device:
+        return "any device is read (daq.any_device)"
+    if config.monitor is None or not config.monitor.journal:
+        return "the first device that tells one is learnt anew at each start: no monitor.journal"
+    return "the first device that tells one is learnt, and another one refused"
 
 
 def check_serial(pattern: str) -> Finding:

@@ -124,8 +124,8 @@ Identification = Annotated[
     str,
     Meta(
         description="text, such as a serial number, that the device must have in its "
-        "identification (function 43/14); of another device no sample is taken; empty for any "
-        "device"
+        "identification (function 43/14); of another device no sample is taken; empty for what "
+        "the first device told"
     ),
 ]
 
@@ -179,6 +179,13 @@ class DaqSection(Section, frozen=True):
 
     device: Annotated[DeviceSection, Meta(description="the adapter and its settings")]
     name: Annotated[Text, Meta(description="the device's name in messages")] = "rig"
+    any_device: Annotated[
+        bool,
+        Meta(
+            description="samples are also taken of another device than the one that was met first; "
+            "otherwise it has to be accepted with `rigwatch accept`"
+        ),
+    ] = False
     ring: Annotated[
         int, Meta(ge=256, description="samples stored for readers that missed some")
     ] = 65536

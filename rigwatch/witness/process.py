@@ -33,6 +33,7 @@ from rigwatch.wire.messages import (
 )
 from rigwatch.wire.rig_config import RigConfig, SecuritySection, WitnessSection
 from rigwatch.witness.announcer import Announcer
+from rigwatch.witness.doubles import RESTART, Doubles
 from rigwatch.witness.kept_alarm import KeptAlarm, beside_journal
 from rigwatch.witness.outputs import Outputs
 from rigwatch.witness.silence import Silence
@@ -58,6 +59,7 @@ class Witness:
         now: monotonic time [s].
         security: section [bus.security].
         kept: keeps the witness's own alarm over restarts.
+        lease: silence after which a link to the router counts as broken [s].
 
     Raises:
         ConfigError: a heartbeat output or the file of people is invalid.
@@ -71,6 +73,8 @@ class Witness:
         now: float,
         security: SecuritySection | None = None,
         kept: KeptAlarm | None = None,
+        *,
+        lease: float = 10.0,
     ) -> None:
         self._security = security = security or SecuritySection()
         self.settings, self._bus = settings, bus
@@ -81,6 +85,7 @@ class Witness:
         self._alarms = bus.listen(ALARMS)
         self._stale_after = settings.stale_after or LEAST_SILENCE
         self._silence = Silence(now + max(0.0, FOR_MONITOR - self._stale_after))
+        self._doubles = Doubles(bus, lease + RESTART)
         self._check = CommandCheck(bus, security)
         self._stale = StaleAlarm(self._check, kept)
         # An alarm of an earlier run ends with an estimate, not with the patience for the first.
@@ -101,7 +106,8 @@ class Witness:
                 self._learn_standing(now)
         silent = self._silence.counted(now)
         stale = self._unheard or silent > self._stale_after
-        for alarm in self._stale.judge(stale, silent, t_ns, self._link_trouble):
+        doubled = self._doubles.text(now)
+        for alarm in self._stale.judge(stale, silent, t_ns, self._link_trouble, doubled):
             self._bus.publish(ALARMS, alarm)
         self._obey(t_ns)
         for alarm in self._alarms.drain():
@@ -160,6 +166,7 @@ class Witness:
     def close(self) -> None:
         """Close the connection to the bus."""
         self._outputs.close()
+        self._doubles.close()
         self._alarms.close()
         self._estimates.close()
 
@@ -181,7 +188,12 @@ def run(config: RigConfig, stop: threading.Event) -> None:
         if bus is None:
             return
         witness = Witness(
-            patient(config), bus, time.monotonic(), config.bus.security, beside_journal(config)
+            patient(config),
+            bus,
+            time.monotonic(),
+            config.bus.security,
+            beside_journal(config),
+            lease=config.bus.lease,
         )
         heartbeat = Heartbeat(PROCESS)
         settle_memory()

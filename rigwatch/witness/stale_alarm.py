@@ -1,4 +1,4 @@
-"""The witness's own alarm: the monitor sends no estimates."""
+"""The witness's own alarm: the monitor sends no estimates, or is not the only one."""
 
 from collections.abc import Callable, Iterator
 
@@ -16,6 +16,7 @@ from rigwatch.wire.messages import (
 from rigwatch.witness.kept_alarm import KeptAlarm
 
 _NONE = float("nan")
+_SILENT = "the monitor sends no estimates"
 
 
 class StaleAlarm:
@@ -35,7 +36,12 @@ class StaleAlarm:
         self._check = check
 
     def judge(
-        self, stale: bool, silent: float, t_ns: int, why: Callable[[], str] = str
+        self,
+        stale: bool,
+        silent: float,
+        t_ns: int,
+        why: Callable[[], str] = str,
+        doubled: str = "",
     ) -> Iterator[Alarm]:
         """The transition, if there is one.
 
@@ -44,14 +50,16 @@ class StaleAlarm:
             silent: time since the last one [s].
             t_ns: Unix time [ns].
             why: asked for the reason when the alarm is raised; "" if none is known.
+            doubled: that several processes call themselves monitor; "" if not.
         """
-        if stale and not self.holds:
-            text = f"for {silent:.1f} s{f'; {reason}' if (reason := why()) else ''}"
-            yield self._become(_alarm("unacknowledged", text, t_ns))
-        elif not stale and self.standing is not None and self.holds:
+        if (stale or doubled) and not self.holds:
+            reason = why()
+            silence = f"{_SILENT}: for {silent:.1f} s" + (f"; {reason}" if reason else "")
+            yield self._become(_alarm("unacknowledged", silence if stale else doubled, t_ns))
+        elif not (stale or doubled) and self.standing is not None and self.holds:
             seen = self.standing.state == "acknowledged"
             state: AlarmState = "normal" if seen else "cleared_unacknowledged"
-            yield self._become(_alarm(state, "estimates come again", t_ns))
+            yield self._become(_alarm(state, "the one monitor is heard again", t_ns))
 
     @property
     def holds(self) -> bool:
@@ -79,7 +87,7 @@ class StaleAlarm:
             return
         user = command.user[:LONGEST_NAME]
         state: AlarmState = "acknowledged" if self.holds else "normal"
-        yield self._become(_alarm(state, "seen", t_ns, user, verdict.identity))
+        yield self._become(_alarm(state, f"{_SILENT}: seen", t_ns, user, verdict.identity))
 
     def _obstacle(self, command: AlarmCommand) -> str:
         if command.action != "acknowledge":
@@ -90,11 +98,12 @@ class StaleAlarm:
 
 
 def _alarm(
-    state: AlarmState, text: str, t_ns: int, user: str = "", identity: Identity = ""
+    state: AlarmState, cause: str, t_ns: int, user: str = "", identity: Identity = ""
 ) -> Alarm:
     return Alarm(
-        MONITOR_STALE, state, "critical", f"the monitor sends no estimates: {text}",
+        MONITOR_STALE, state, "critical", cause,
         "The rig is not being watched. Check the monitor's process and its last message, then "
-        "data acquisition and router.",
+        "data acquisition and router. Where several call themselves monitor, find and end those "
+        "that are not the rig's; with keys no other process can be one.",
         "", 0, -1, t_ns, _NONE, _NONE, _NONE, False, user, -1, identity,
     )  # fmt: skip

@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
+from rigwatch.wire.bus import DEVICE_KEY, DEVICE_RUN_KEY, MAX_PAYLOAD, Bus
 from rigwatch.wire.bus import KEY as MODEL_KEY
-from rigwatch.wire.bus import MAX_PAYLOAD, Bus
 from rigwatch.wire.delivery import SampleReader
 from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import (
@@ -43,6 +43,7 @@ from tests.waiting import eventually
 STRANGERS = ("dashboard", "recorder", "device", "ack-eve")
 """Roles of the hostile clients, the last an operator."""
 MARK = b"\x01" * 16
+FOR_OPERATORS = (MODEL_KEY, "monitor/receiver", DEVICE_KEY, DEVICE_RUN_KEY)
 OF_RECORDERS = ("run", "health/recorder")
 DROPPED = ("rejected", "foreign_samples", "duplicate_samples")
 """Counters of the monitor for what it does not take for samples of its rig."""
@@ -237,7 +238,7 @@ def _allowed_by_role(client: Bus, how: str, key: str) -> bool:
     """Whether the access list lets a message pass."""
     operator = client.process.startswith("ack")
     if how == "ask":
-        return operator or key not in (MODEL_KEY, "monitor/receiver")
+        return operator or key not in FOR_OPERATORS
     if key in OF_RECORDERS:
         return client.process == "recorder"
     return key in ALLOWED_SAID or (operator and key == COMMANDS.key)

@@ -10,7 +10,7 @@ import pytest
 from rigwatch.commands import main
 from rigwatch.keys import Authority
 from rigwatch.wire.access import ROLES, ending_soon, read_register
-from rigwatch.wire.bus import Bus, connect, open_router
+from rigwatch.wire.bus import DEVICE_KEY, DEVICE_RUN_KEY, Bus, connect, open_router
 from rigwatch.wire.errors import BusError, ConfigError, KeysError
 from rigwatch.wire.messages import (
     ALARMS,
@@ -116,6 +116,22 @@ def test_only_daq_and_recorder_say_how_they_are(secured: RigConfig) -> None:
             assert own[bus.process].drain() == []
     finally:
         for bus in (monitor, daq, recorder, dashboard):
+            bus.close()
+
+
+def test_only_daq_answers_for_its_device_and_only_operators_ask(secured: RigConfig) -> None:
+    names = ("daq", "dashboard", "recorder", "accept-1")
+    daq, dashboard, recorder, operator = (connect(secured, name, PATIENCE) for name in names)
+    try:
+        for key in (DEVICE_KEY, DEVICE_RUN_KEY):
+            dashboard.serve(key, lambda _: [b"dashboard"])
+            until_reached(dashboard, operator)
+            daq.serve(key, lambda _: [b"daq"])
+            eventually(lambda k=key: b"daq" in operator.query(k), "daq answers")  # type: ignore[misc]
+            assert operator.query(key) == [b"daq"]
+            assert recorder.query(key, timeout=0.5) == []
+    finally:
+        for bus in (daq, dashboard, recorder, operator):
             bus.close()
 
 

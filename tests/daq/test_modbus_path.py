@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from daq.adapters import adapter_for
+from daq.adapters.identification import Identification
 from daq.adapters.modbus_poll import ModbusAdapter, RefusedError
+from daq.known_device import KnownDevice
 from rigwatch.wire.errors import DeviceError, ModbusError
 from rigwatch.wire.host.ports import free_port
 from sim_plant.serve.modbus_server import ModbusServer
@@ -132,17 +134,19 @@ def test_a_device_that_takes_another_s_place_on_an_open_line_is_checked() -> Non
     banks = RegisterBank(3), RegisterBank(3)
     for device, bank in zip((first, second), banks, strict=True):
         bank.add(device.advance(10))
-    time, asked = HostTime(), list[int]()
+    time, told = HostTime(), {0: "RX-2", 0x80: "no. 4711"}
     registers = BankRegisters(banks[0])
-    adapter = ModbusAdapter(
-        registers, 3, clock=time, sleep=time.pass_by, check=lambda: asked.append(1)
-    )
+    who = Identification(lambda: told, "", "the device")
+    adapter = ModbusAdapter(registers, 3, clock=time, sleep=time.pass_by, who=who)
+    adapter.check_against(KnownDevice("daq", None))
     adapter.open()
     for _ in range(3):
         time.pass_by(1 / 32)
         adapter.read(1.0)
-    assert len(asked) == 1
-    registers.read = banks[1].read
+    told[0x80], registers.read = "no. 4712", banks[1].read
+    time.pass_by(1 / 32)
+    with pytest.raises(RefusedError, match=r"another device, 'RX-2, no. 4712', expected .*4711"):
+        adapter.read(1.0)
+    told[0x80] = "no. 4711"  # the same device, started anew
     time.pass_by(1 / 32)
     assert {block.boot for block in adapter.read(1.0)} == {second.boot} != {first.boot}
-    assert len(asked) == 2

@@ -2,16 +2,18 @@
 
 A folder a version, named by its day: what `rigwatch demo` of that version left behind, its session
 cut to two seconds after friction was named, and its folder renamed to /var/lib/rig. `left.toml`
-says what was read of the files when they were kept. `python -m tools.keep_version` makes one.
-Another folder has a study of two logs, made and extended by its version.
+says what was read of the files when they were kept, `formats.toml` in which formats they are.
+`python -m tools.keep_version` makes one, with a study of the two logs that one folder holds.
 """
 
 import json
 import re
 import tomllib
 from pathlib import Path
+from typing import Annotated
 
 import pytest
+from msgspec import Meta, defstruct
 
 from monitor.alarms import AlarmManager, read_journal
 from rigwatch.archive import Store, query
@@ -19,10 +21,12 @@ from rigwatch.commands import main
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.session import open_session
 from tests.alarms.alarm_signals import newest
-from tools.keep_version import left_in
+from tools.keep_version import formats
+from tools.keep_version.keeping import CONSTANT, left_in
 
 HERE = Path(__file__).parent
 VERSIONS = sorted(path for path in HERE.iterdir() if (path / "session.mcap").is_file())
+STUDIES = sorted(path.parent for path in HERE.glob("*/study/study.toml"))
 INDEXED = sorted(path for path in HERE.iterdir() if (path / "rigwatch-index").is_dir())
 ROOT = HERE.parents[1]
 LAST_BEFORE_TOML = "2026-11-20"
@@ -45,6 +49,30 @@ def test_every_released_version_has_kept_files() -> None:
     assert len(VERSIONS) >= 4
 
 
+def test_files_of_the_present_formats_are_kept() -> None:
+    newest = VERSIONS[-1]
+    file = newest / formats.NAME
+    kept = tomllib.loads(file.read_text("utf-8")) if file.exists() else {}
+    changed = formats.changed(kept, formats.digests(CONSTANT))
+    assert not changed, (
+        f"the formats of {', '.join(changed)} are no longer those of {newest.relative_to(ROOT)}: "
+        "run `python -m tools.keep_version` and commit the folder that it makes"
+    )
+
+
+def test_a_format_that_changes_is_told_and_words_are_no_format() -> None:
+    def struct(description: str, **more: type) -> type:
+        text = Annotated[str, Meta(description=description)]
+        return defstruct("Format", [("name", text), *more.items()])
+
+    before = formats.digest_of(struct("the name"))
+    assert formats.digest_of(struct("what it is called")) == before
+    assert formats.digest_of(struct("the name", unit=str)) != before
+    kept = {"model": before, "study": "5"}
+    assert formats.changed(kept, dict(kept)) == []
+    assert formats.changed(kept, {"model": "6", "index": "7"}) == ["index", "model", "study"]
+
+
 def test_what_was_read_of_the_files_then_is_read_of_them_now(version: Path) -> None:
     left = tomllib.loads((version / "left.toml").read_text("utf-8"))
     assert left_in(version) == left
@@ -52,6 +80,7 @@ def test_what_was_read_of_the_files_then_is_read_of_them_now(version: Path) -> N
     assert left["friction"] != "normal"
     assert left["position"] >= 0
     assert ("recorded" in left) == (version.name > LAST_BEFORE_TOML)
+    assert ("device" in left) == (version / formats.NAME).exists()
 
 
 def test_kept_files_are_small(version: Path) -> None:
@@ -95,8 +124,11 @@ def test_a_journal_is_read_whole_and_its_alarms_stand(version: Path) -> None:
     assert "dry_friction" in {alarm.name for alarm in alarms.standing()}
 
 
-def test_a_study_shows_its_effects_and_its_steps(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["study", "show", str(HERE / "2026-11-23" / "study")]) == 0
+@pytest.mark.parametrize("study", STUDIES, ids=lambda path: path.parent.name)
+def test_a_study_shows_its_effects_and_its_steps(
+    study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["study", "show", str(study)]) == 0
     shown = capsys.readouterr().out
     assert "coulomb@shaft" in shown
     steps = [line.split()[1] for line in shown.splitlines() if line.strip().startswith("2026-")]

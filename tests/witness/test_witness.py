@@ -2,6 +2,7 @@
 
 import json
 import sys
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from rigwatch.wire.messages import (
     Event,
 )
 from rigwatch.wire.rig_config import SecuritySection, WitnessSection
+from rigwatch.witness.doubles import RESTART
 from rigwatch.witness.kept_alarm import KeptAlarm
 from rigwatch.witness.process import Witness
 from rigwatch.witness.stale_alarm import StaleAlarm
@@ -119,6 +121,35 @@ def test_a_witness_that_is_killed_leaves_no_alarm_behind_and_hides_none(tmp_path
     standing = kept.read()
     assert standing is not None
     assert standing.state == "cleared_unacknowledged"
+
+
+def test_a_second_process_that_calls_itself_monitor_is_an_alarm_until_one_is_left() -> None:
+    network, lease = MemoryNetwork(), 1.0
+    monitor, stranger = network.bus("r", "monitor"), network.bus("r", "monitor")
+    page = network.bus("r", "dashboard").subscribe(ALARMS)
+    witness = Witness(WitnessSection(), network.bus("r", "witness"), 0.0, lease=lease)
+    seconds, said = count(1), list[Alarm]()
+
+    def passes(state: str) -> bool:
+        """A second passes, in which estimates come; whether the alarm has this state."""
+        now = next(seconds)
+        monitor.publish(ESTIMATES, estimates(now))
+        witness.turn(float(now), now * 10**9)
+        said.extend(page.drain())
+        return bool(said) and said[-1].state == state
+
+    for _ in range(20):
+        passes("")
+    assert said == [], "one monitor"
+    stranger.announce()
+    began = next(seconds)
+    eventually(lambda: passes("unacknowledged"), "the alarm")
+    assert said[-1].name == MONITOR_STALE
+    assert "2 processes call themselves monitor" in said[-1].cause
+    assert said[-1].t_ns >= (began + lease + RESTART) * 10**9
+    stranger.close()
+    eventually(lambda: passes("cleared_unacknowledged"), "its end")
+    assert len(said) == 2
 
 
 def test_a_silence_that_is_over_stands_until_somebody_has_seen_it(tmp_path: Path) -> None:

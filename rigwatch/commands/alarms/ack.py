@@ -1,4 +1,4 @@
-"""`rigwatch ack`: acknowledges alarms, or resets those whose cause is gone."""
+"""`rigwatch ack`: acknowledges alarms, resets those whose cause is gone, or shelves one."""
 
 import argparse
 import json
@@ -8,12 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rigwatch.wire.messages import AlarmCommand
+    from rigwatch.wire.bus import Bus
+    from rigwatch.wire.messages import Alarm, AlarmCommand
 
-HELP = "acknowledge or reset alarms of a rig"
+HELP = "acknowledge, reset or shelve alarms of a rig"
 EXAMPLE = """  rigwatch ack configs/demo.toml --user ann
-  rigwatch ack configs/demo.toml dry_friction --user ann --reset"""
+  rigwatch ack configs/demo.toml dry_friction --user ann --reset
+  rigwatch ack configs/demo.toml loss --user ann --shelve --text "cable on order\""""
 TIMEOUT = 3.0
+SHELF = ("alarm_shelved", "alarm_unshelved")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,8 +28,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="",
         help="who acts; default: the operator of the certificate, or without keys the login name",
     )
-    parser.add_argument(
+    action = parser.add_mutually_exclusive_group()
+    action.add_argument(
         "--reset", action="store_true", help="reset latched alarms whose condition has gone"
+    )
+    action.add_argument(
+        "--shelve",
+        action="store_true",
+        help="do not announce the alarm NAME for eight hours; not for critical ones",
+    )
+    action.add_argument(
+        "--unshelve", action="store_true", help="announce the alarm NAME again from now on"
     )
     parser.add_argument("--text", default="", help="remark kept in the journal")
 
@@ -35,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Send the command and print the changes; 1 if there are none."""
     from rigwatch.commands.alarms.alarms import as_line
     from rigwatch.wire.access import operator_name
-    from rigwatch.wire.bus import command_alarms, connect, unique_process
+    from rigwatch.wire.bus import connect, unique_process
     from rigwatch.wire.messages import json_fields
     from rigwatch.wire.rig_config import load_rig
 
@@ -43,24 +55,49 @@ def run(arguments: argparse.Namespace) -> int:
     command = command_of(arguments, operator_name(config.bus, arguments.user))
     bus = connect(config, unique_process("ack"), TIMEOUT)
     try:
-        changed, refusal = command_alarms(bus, command)
+        changed, shelf, refusal = sent(bus, command)
     finally:
         bus.close()
     if arguments.json:
-        print(
-            json.dumps({"changed": [json_fields(alarm) for alarm in changed], "refusal": refusal})
-        )
+        alarms = [json_fields(alarm) for alarm in changed]
+        print(json.dumps({"changed": alarms, "shelf": shelf, "refusal": refusal}))
     else:
-        print("\n".join(as_line(alarm) for alarm in changed) or "nothing changed")
+        print("\n".join([*map(as_line, changed), *shelf]) or "nothing changed")
         if refusal:
             print(f"rigwatch: {refusal}", file=sys.stderr)
-    return 0 if changed else 1
+    return 0 if changed or shelf else 1
+
+
+def sent(bus: "Bus", command: "AlarmCommand") -> "tuple[list[Alarm], list[str], str]":
+    """Send a command.
+
+    Returns:
+        the changed alarms, what was put on the shelf or taken off it, and the reason of a refusal.
+    """
+    from rigwatch.wire.bus import command_alarms
+    from rigwatch.wire.messages import EVENTS
+
+    events = bus.subscribe(EVENTS)
+    try:
+        changed, refusal = command_alarms(bus, command)
+        said = [one.text for one in events.drain() if one.code in SHELF]
+    finally:
+        events.close()
+    return changed, [text for text in said if command.user in text], refusal
 
 
 def command_of(arguments: argparse.Namespace, user: str) -> "AlarmCommand":
-    """The command of an operator."""
+    """The command of an operator.
+
+    Raises:
+        RigwatchError: the alarm to be shelved is not named.
+    """
+    from rigwatch.wire.errors import RigwatchError
     from rigwatch.wire.messages import EVERY_ALARM, AlarmCommand
 
-    action = "reset" if arguments.reset else "acknowledge"
+    chosen = [one for one in ("reset", "shelve", "unshelve") if getattr(arguments, one)]
+    action = chosen[0] if chosen else "acknowledge"
+    if action.endswith("shelve") and not arguments.name:
+        raise RigwatchError(f"--{action}: found no alarm, expected the NAME of one")
     name = arguments.name or EVERY_ALARM
     return AlarmCommand(name, action, user, time.time_ns(), arguments.text)  # type: ignore[arg-type]

@@ -36,14 +36,14 @@ _SAYS: dict[str, tuple[str, ...]] = {
     "operator": (COMMANDS.key,),
 }
 _ANSWERS = {
-    "daq": (RING_KEY,),
+    "daq": (RING_KEY, "daq/device", "daq/receiver"),
     "recorder": (PAST_KEY,),
     "monitor": ("ring/**", "monitor/standing", "monitor/receiver", "monitor/model"),
     "witness": ("ring/witness/**", "monitor/standing", "monitor/receiver"),
 }
 _TOKENS = {"daq": ("source/*",), "monitor": ("said/**",), "witness": ("said/witness/*",)}
 """Tokens with names, which their holder also sends and answers with."""
-_ASKS = {"operator": ("monitor/receiver", "monitor/model", PAST_KEY)}
+_ASKS = {"operator": ("monitor/receiver", "monitor/model", "daq/device", "daq/receiver", PAST_KEY)}
 """The recorder of a headquarters has the certificate of an operator."""
 _EVERYBODY_ASKS = (RING_KEY, "ring/**", "monitor/standing", "source/*", "said/**")
 

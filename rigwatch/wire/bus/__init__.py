@@ -3,18 +3,24 @@
     Bus             what processes use: messages are encoded and checked here
      └ Transport    what carries the bytes: Zenoh, or memory in tests
 
-`connect` joins the bus of a rig. `commands` are what operators ask of its monitor.
+`connect` joins the bus of a rig. `commands` are what operators ask of its monitor and daq.
 """
 
 from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.bus.commands import (
+    DEVICE_KEY,
+    DEVICE_RUN_KEY,
     KEY,
     PATIENCE,
     CommandCheck,
+    DeviceReply,
+    DeviceRequest,
     ModelReply,
     ModelRequest,
     Verdict,
+    accept_device,
     ask_alarm_list,
+    ask_for_device,
     ask_for_model,
     command_alarms,
     command_mark,
@@ -39,6 +45,8 @@ from rigwatch.wire.bus.transport import DENIED_MARK, MAX_PAYLOAD, REFUSED_MARK, 
 
 __all__ = [
     "DENIED_MARK",
+    "DEVICE_KEY",
+    "DEVICE_RUN_KEY",
     "KEY",
     "MAX_PAYLOAD",
     "MOST_COMMANDS",
@@ -50,6 +58,8 @@ __all__ = [
     "Close",
     "CommandCheck",
     "CompleteSubscription",
+    "DeviceReply",
+    "DeviceRequest",
     "Inbox",
     "ModelReply",
     "ModelRequest",
@@ -58,7 +68,9 @@ __all__ = [
     "SharedLinks",
     "Subscription",
     "Verdict",
+    "accept_device",
     "ask_alarm_list",
+    "ask_for_device",
     "ask_for_model",
     "command_alarms",
     "command_mark",

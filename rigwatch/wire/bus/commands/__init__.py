@@ -1,4 +1,4 @@
-"""What operators ask of a rig, signed: alarms acknowledged or shelved, another model."""
+"""What operators ask of a rig, signed: alarms acknowledged or shelved, another model or device."""
 
 from rigwatch.wire.bus.commands.alarm_command import command_alarms
 from rigwatch.wire.bus.commands.alarm_list import ask_alarm_list, serve_alarm_list
@@ -8,18 +8,31 @@ from rigwatch.wire.bus.commands.command_check import (
     command_mark,
     proved_here,
 )
+from rigwatch.wire.bus.commands.device_change import (
+    DEVICE_KEY,
+    DEVICE_RUN_KEY,
+    accept_device,
+    ask_for_device,
+)
+from rigwatch.wire.bus.commands.device_request import DeviceReply, DeviceRequest
 from rigwatch.wire.bus.commands.model_change import KEY, PATIENCE, ask_for_model
 from rigwatch.wire.bus.commands.model_request import ModelReply, ModelRequest
 from rigwatch.wire.bus.commands.refusal import marked
 
 __all__ = [
+    "DEVICE_KEY",
+    "DEVICE_RUN_KEY",
     "KEY",
     "PATIENCE",
     "CommandCheck",
+    "DeviceReply",
+    "DeviceRequest",
     "ModelReply",
     "ModelRequest",
     "Verdict",
+    "accept_device",
     "ask_alarm_list",
+    "ask_for_device",
     "ask_for_model",
     "command_alarms",
     "command_mark",

@@ -11,15 +11,18 @@ from typing import TypeVar
 
 from rigwatch.wire.access import signer_of, verifier_of
 from rigwatch.wire.bus.bus import Bus
+from rigwatch.wire.bus.commands.device_request import DeviceRequest
 from rigwatch.wire.bus.commands.model_request import ModelRequest
 from rigwatch.wire.errors import BusError, KeysError
 from rigwatch.wire.messages import NOT_PROVED, PROVED, AlarmCommand, Identity, encode
 from rigwatch.wire.rig_config import BusSection, SecuritySection
 
 RUN_KEY = "monitor/receiver"
+"""Key at which the receivers of commands for monitor and witness tell their runs."""
 TIMEOUT = 3.0
 """Longest wait for the receivers' runs [s]."""
-Command = TypeVar("Command", AlarmCommand, ModelRequest)
+AnyCommand = AlarmCommand | ModelRequest | DeviceRequest
+Command = TypeVar("Command", AlarmCommand, ModelRequest, DeviceRequest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,19 +44,20 @@ class CommandCheck:
     Args:
         bus: of the process.
         security: section [bus.security].
+        run_key: key at which the process tells its run to those who sign.
 
     Attributes:
         refused: number of commands refused, those included that could not be read.
     """
 
-    def __init__(self, bus: Bus, security: SecuritySection) -> None:
+    def __init__(self, bus: Bus, security: SecuritySection, run_key: str = RUN_KEY) -> None:
         self.refused = 0
         self._counting = threading.Lock()
         self._verifier = verifier_of(security, bus.rig)
         run = self._verifier.run.encode()
-        bus.serve(RUN_KEY, lambda _: [run])
+        bus.serve(run_key, lambda _: [run])
 
-    def judge(self, command: AlarmCommand | ModelRequest) -> Verdict:
+    def judge(self, command: AnyCommand) -> Verdict:
         """Whether `command` may be executed."""
         try:
             self._verifier.check(command.user, command.proof, _said(command))
@@ -68,21 +72,27 @@ class CommandCheck:
             self.refused += 1
 
 
-def signed(bus: Bus, command: Command) -> Command:
+def signed(bus: Bus, command: Command, run_key: str = RUN_KEY) -> Command:
     """The command with the operator's proof; unchanged on a bus without a signer.
 
+    Args:
+        bus: of the operator's side.
+        command: without a proof.
+        run_key: key at which its receivers tell their runs.
+
     Raises:
-        BusError: no monitor answers.
+        BusError: no receiver answers.
         KeysError: the operator's key or the account's secret cannot be read.
     """
     if bus.signer is None:
         return command
     runs = []
-    for reply in bus.query(RUN_KEY, timeout=TIMEOUT):
+    for reply in bus.query(run_key, timeout=TIMEOUT):
         with contextlib.suppress(UnicodeDecodeError):
             runs.append(reply.decode("ascii"))
     if not runs:
-        raise BusError(f"no monitor of rig {bus.rig} answers: start `rigwatch monitor`")
+        process = run_key.partition("/")[0]
+        raise BusError(f"no {process} of rig {bus.rig} answers: start `rigwatch {process}`")
     return replace(command, proof=bus.signer.sign(bus.rig, tuple(runs), _said(command)))
 
 
@@ -91,7 +101,7 @@ def command_mark(command: AlarmCommand) -> str:
     return f"command {hashlib.sha256(encode(command)).hexdigest()[:16]}"
 
 
-def proved_here(bus: BusSection, rig: str, command: AlarmCommand | ModelRequest) -> Identity:
+def proved_here(bus: BusSection, rig: str, command: AnyCommand) -> Identity:
     """Prove the operator of this machine without a monitor, for a change of files.
 
     Without keys the permissions of the files decide.
@@ -107,7 +117,7 @@ def proved_here(bus: BusSection, rig: str, command: AlarmCommand | ModelRequest)
     return PROVED
 
 
-def _said(command: AlarmCommand | ModelRequest) -> tuple[str, ...]:
+def _said(command: AnyCommand) -> tuple[str, ...]:
     """What is signed: the class of the command, then all its fields except the proof."""
     names = [one.name for one in fields(command) if one.name != "proof"]
     return type(command).__name__, *(str(getattr(command, name)) for name in names)

@@ -1,17 +1,16 @@
-"""Keeps files that this version has written, which all later versions have to read.
+"""The files of a demonstration, and of a study, as a version leaves them.
 
     rigwatch demo ──▶ its folder ──▶ tests/versions/DAY/ rig.toml, model.toml, session.mcap,
-                              positions, alarms.jsonl with its position, rigwatch-index/, left.toml
+            positions, alarms.jsonl with its position, rigwatch-index/, formats.toml, left.toml
+    two kept logs ──▶ a study of them, with an effect ──▶ tests/versions/DAY/study/
+    an identity ──▶ a device as daq remembers it ──▶ tests/versions/DAY/alarms.jsonl.device
 
-`python -m tools.keep_version` runs the demonstration, about two minutes; with the folder of one
-that this version has run, it takes that. Of the session stay two seconds after friction was named,
-and the folder is renamed to /var/lib/rig. `left.toml` says what was read of the files when they
-were kept; `tests/versions` compares it with what is read of them now.
+Of the session stay two seconds after friction was named, and the folder is renamed to /var/lib/rig.
+`left.toml` says what was read of the files when they were kept; `tests/versions` compares it with
+what is read of them now.
 """
 
 import hashlib
-import subprocess
-import sys
 import tempfile
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -19,34 +18,41 @@ from pathlib import Path
 from shutil import copy
 from typing import Any
 
+from daq.known_device import KnownDevice, read_devices
 from monitor.alarms import AlarmManager, read_journal
 from monitor.process.cursor import Cursor
 from rigwatch.archive import Store, index
+from rigwatch.commands import main as rigwatch
 from rigwatch.recorder import load_positions, newest
+from rigwatch.wire.errors import ModelError
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.session import Session, open_session, trim
 from rigwatch.wire.session.edit import copy_messages
 from rigwatch.wire.typed_files import as_toml
+from rigwatch.workbench.study import create
+from tools.keep_version import formats
 
-VERSIONS = Path(__file__).parents[1] / "tests" / "versions"
+VERSIONS = Path(__file__).parents[2] / "tests" / "versions"
+LOGS = VERSIONS / "2026-11-23" / "study"
+"""Folder of two logs of a motor, of which every version makes a study."""
+STUDY = """model = "motor"
+start = { R = 2.0, K = 0.06, J = 0.0002 }
+
+[[train]]
+session = "run1.mcap"
+
+[[held_out]]
+session = "run2.mcap"
+"""
+EFFECT = "coulomb@shaft"
+DEVICE = "rigwatch, simulated rig, RX-2 no. 4711"
 PLACE = "/var/lib/rig"
 AFTER, LENGTH = 256, 588
 """The part of the session that is kept: samples from the naming of friction on, and how many."""
 FRICTION = "dry_friction"
+CONSTANT = VERSIONS / "2026-11-24" / "session.mcap"
+"""A recording that stays the same, for the digests of formats."""
 FILES = ("model.toml", "alarms.jsonl", "alarms.jsonl.position")
-
-
-def main() -> int:
-    """0 if the files are kept."""
-    if sys.argv[1:]:
-        print(keep(Path(sys.argv[1]), VERSIONS))
-        return 0
-    with tempfile.TemporaryDirectory() as folder:
-        words = [sys.executable, "-m", "rigwatch", "demo", "--headless", "--folder", folder]
-        done = subprocess.run(words, check=False)
-        if done.returncode == 0:
-            print(keep(Path(folder), VERSIONS))
-        return done.returncode
 
 
 def keep(demo: Path, versions: Path) -> Path:
@@ -57,10 +63,9 @@ def keep(demo: Path, versions: Path) -> Path:
         versions: folder of the kept versions.
 
     Returns:
-        the new folder, named by the day of the recording.
+        the new folder, named by the day of the recording; with a number if that day has one.
 
     Raises:
-        FileExistsError: that day has one.
         RigwatchError: the demonstration's files cannot be read.
     """
     config = load_rig(demo / "rig.toml")
@@ -69,8 +74,7 @@ def keep(demo: Path, versions: Path) -> Path:
     text = (demo / "rig.toml").read_text("utf-8").replace(f'"{written}/', f'"{PLACE}/')
     session = open_session(newest(demo / "sessions", config.rig.id))
     day = datetime.fromtimestamp(session.info.t_ns / 1e9, UTC).strftime("%Y-%m-%d")
-    target = versions / day
-    target.mkdir()
+    target = _new_folder(versions, day)
     (target / "rig.toml").write_text(text, "utf-8")
     for name in FILES:
         copy(demo / name, target)
@@ -78,8 +82,28 @@ def keep(demo: Path, versions: Path) -> Path:
     _keep_session(session, text, target / "session.mcap")
     index(Store(str(target)))
     (target / "rigwatch-index" / "lock").unlink(missing_ok=True)
+    _keep_study(target / "study")
+    KnownDevice("daq", target / "alarms.jsonl.device").admits(DEVICE)
+    (target / formats.NAME).write_text(as_toml(formats.digests(CONSTANT)), "utf-8")
     (target / "left.toml").write_text(as_toml(left_in(target)), "utf-8")
     return target
+
+
+def _new_folder(versions: Path, day: str) -> Path:
+    names = (day, *(f"{day}-{number}" for number in range(2, 100)))
+    target = next(path for name in names if not (path := versions / name).exists())
+    target.mkdir()
+    return target
+
+
+def _keep_study(folder: Path) -> None:
+    """A study of the kept logs, with an effect."""
+    with tempfile.TemporaryDirectory() as made:
+        template = Path(made, "template.toml")
+        template.write_text(STUDY, "utf-8")
+        create(folder, template, LOGS)
+    if rigwatch(["add", str(folder), EFFECT]) != 0:
+        raise ModelError(f"{folder}: the effect {EFFECT} is not accepted")
 
 
 def _keep_session(session: Session, configuration: str, target: Path) -> None:
@@ -109,7 +133,8 @@ def left_in(version: Path) -> dict[str, Any]:
     Returns:
         `software` that wrote the session; its `samples` and `estimates`; `friction`, the state of
         the friction alarm in the journal; `position`, the number of the monitor's last sample;
-        `recorded`, that of the recorder's last message of estimates, where it is kept.
+        `recorded`, that of the recorder's last message of estimates, and `device`, what the rig's
+        device told of itself, where they are kept.
     """
     session = open_session(version / "session.mcap")
     records, _ = read_journal(version / "alarms.jsonl")
@@ -119,6 +144,7 @@ def left_in(version: Path) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         # A monitor maps its own file, and may write it.
         place = Cursor(Path(copy(version / "alarms.jsonl.position", folder))).read()
+    devices = read_devices(version / "alarms.jsonl.device")
     kept = load_positions(version).get("estimates", {}).get("monitor")
     return {
         "software": session.info.software,
@@ -127,8 +153,5 @@ def left_in(version: Path) -> dict[str, Any]:
         "friction": states.get(FRICTION, "normal"),
         "position": -1 if place is None else place[1],
         **({"recorded": kept[1]} if kept else {}),
+        **({"device": devices[-1].identity} if devices else {}),
     }
-
-
-if __name__ == "__main__":
-    sys.exit(main())
