@@ -119,7 +119,7 @@ def block_of(kind: type[K], layout: Layout, head: tuple[str, int, int], numbers:
             for name, unit, judged in layout.names
         ]
     )
-    return kind(*head, *times, columns)  # type: ignore[call-arg, arg-type]
+    return kind(*head, *times, columns)  # type: ignore[call-arg]
 
 
 def _numbers(part: _Part) -> Numbers:

@@ -101,7 +101,7 @@ def _samples_in(kind: type[Any], data: bytes) -> int:
 
 def _decoded(kind: type[K], payloads: Sequence[bytes]) -> Iterator[K]:
     index = _index(kind, payloads)
-    begins = np.flatnonzero(~index.follows).tolist()
+    begins: list[int] = np.flatnonzero(~index.follows).tolist()
     for first, last in pairwise([*begins, len(payloads)]):
         if index.table[first] < 0:
             yield decode_block(kind, payloads[first])
@@ -181,8 +181,10 @@ def _copy(layout: Layout, rows: ByteArray, to: Numbers, done: int) -> None:
     span = slice(done, done + len(rows) * layout.samples)
     flags = [column.quality for column in layout.columns if column.quality >= 0]
     values = [column.values for column in layout.columns]
-    for starts, numbers, size in zip(
-        (layout.times, values, flags), to, (_WORD, _WORD, 1), strict=True
+    for starts, numbers, size in (
+        (layout.times, to[0], _WORD),
+        (values, to[1], _WORD),
+        (flags, to[2], 1),
     ):
         width = size * layout.samples
         for start, row in zip(starts, numbers, strict=True):
