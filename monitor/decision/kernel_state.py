@@ -26,11 +26,11 @@ NO_VERDICT, FRICTION, OTHER, STICKING, NEW_EXCITATION = 0, 1, 2, 3, 4
 
 (
     MODELLED, RESIDUAL, CHANGE, SPEED, THETA1, THETA2, LOW1, HIGH1, LOW2, HIGH2,
-    OBSERVABLE, ARMED_FLAG, DEVIATION, EXPLAINED, SHARE, RHO, REST, VERDICT, CONDITION,
-    MOVED_VOLTAGE, SPEED_RMS, TOGETHER, LEARNT_HERE,
+    OBSERVABLE, ARMED_FLAG, DEVIATION, EXPLAINED, SHARE, REST, VERDICT, RHO, TOGETHER,
+    CONDITION, MOVED_VOLTAGE, SPEED_RMS, LEARNT_HERE,
 ) = range(23)  # fmt: skip
 OUTPUTS = 23
-"""Number of outputs; the names above index `held` and the kernel's output."""
+"""Number of outputs; the names above index `held` and the kernel's output, published ones first."""
 
 _COUNTS = np.dtype(
     [

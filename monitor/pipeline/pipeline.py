@@ -59,10 +59,10 @@ PUBLISHED: tuple[tuple[str, str, int], ...] = (
     ("rho", "", w.RHO),
     ("together", "", w.TOGETHER),
 )
-"""Columns of an estimate block: name, unit, index in the kernel's output."""
+"""Columns of an estimate block: name, unit, index in the kernel's output, where they come first."""
 _NAMES = tuple((name, unit) for name, unit, _ in PUBLISHED)
-PUBLISHED_ROWS = np.array([row for _, _, row in PUBLISHED])
-"""Rows of the kernel's output that are published."""
+PUBLISHED_ROWS = slice(len(PUBLISHED))
+"""Rows of the kernel's output that are published; a slice, so that none is copied."""
 
 
 class Monitor:

@@ -154,7 +154,7 @@ def _within_limits(row: FloatArray) -> bool:
     return True
 
 
-@part()
+@part(inline="always")
 def _filter(readings: FloatArray, missing: bool, f: Filters, out: FloatArray) -> None:
     """One sample through all filters, to the stage's columns, shape (7,)."""
     state, late = f.now, f.now.late
@@ -191,7 +191,7 @@ def _pass_gap(readings: FloatArray, usual: FloatArray, f: Filters) -> None:
     f.missing[0] = 0
 
 
-@part()
+@part(inline="always")
 def _follow_gap(readings: FloatArray, held: bool, usual: FloatArray, f: Filters) -> None:
     """Keep what a gap needs, before its first sample and after its last one."""
     if held:

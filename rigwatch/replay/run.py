@@ -13,7 +13,7 @@ from pathlib import Path
 from monitor.alarms import Announcement
 from monitor.model import RigModel, parse_model
 from monitor.pipeline import RigMonitor, Watched
-from rigwatch.replay.source import Item, items
+from rigwatch.replay.source import JUDGED_SAMPLES, Item, items
 from rigwatch.wire.access import names_a_person
 from rigwatch.wire.errors import RigwatchError, SessionError
 from rigwatch.wire.messages import (
@@ -26,7 +26,7 @@ from rigwatch.wire.messages import (
     SampleBlock,
 )
 from rigwatch.wire.new_file import new_file
-from rigwatch.wire.session import MERGED_SAMPLES, LostSpan, Session, SessionWriter
+from rigwatch.wire.session import LostSpan, Session, SessionWriter
 
 PACED_BLOCK = 0.05
 """Length of a block in a timed replay [s of the wall clock]."""
@@ -160,7 +160,7 @@ def replay(
     """
     done, began = Replay(), time.perf_counter()
     rate = session.info.sample_rate_hz
-    size = max(1, int(PACED_BLOCK * speed * rate)) if speed > 0 else MERGED_SAMPLES
+    size = max(1, int(PACED_BLOCK * speed * rate)) if speed > 0 else JUDGED_SAMPLES
     found = _paced(items(session, *span, size), speed)
     with _sink(session, out) as write:
         for judged in judge(session, monitor, found):

@@ -12,10 +12,12 @@ import numpy as np
 
 from rigwatch.wire.bus import command_mark
 from rigwatch.wire.messages import AlarmCommand, Event, ModelChange, SampleBlock, cut, pieces
-from rigwatch.wire.session import MERGED_SAMPLES, Session
+from rigwatch.wire.session import Session
 
 Order = AlarmCommand | ModelChange
 Item = SampleBlock | Order
+JUDGED_SAMPLES = 4096
+"""Longest block that is judged at once: results of longer ones do not fit into a core's cache."""
 _MARK = re.compile(r"\((command [0-9a-f]{16})\)$")
 
 
@@ -23,7 +25,7 @@ def items(
     session: Session,
     start: int | None = None,
     end: int | None = None,
-    size: int = MERGED_SAMPLES,
+    size: int = JUDGED_SAMPLES,
     device: str | None = None,
 ) -> Iterator[Item]:
     """Samples in blocks of at most `size`, with commands and model changes between them."""

@@ -115,6 +115,13 @@ def test_cutting_into_blocks_changes_no_bit(size: int) -> None:
         assert np.array_equal(joined, values(whole, name)), name
 
 
+def test_published_outputs_come_first_and_are_not_copied() -> None:
+    assert [row for _, _, row in PUBLISHED] == [*range(len(PUBLISHED))]
+    result = watched(HEALTHY)
+    departure = next(one for one in result.conditions if one.name == kinds.DEPARTURE)
+    assert np.shares_memory(values(result, "deviation"), departure.value)
+
+
 def test_a_block_seen_before_gives_nothing() -> None:
     monitor = Monitor(model())
     assert monitor.update(block(HEALTHY, 0, 100)) is not None

@@ -1,6 +1,8 @@
 """The fast reader and writer of blocks say what the general ones say, for any bytes."""
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,13 +10,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigwatch.wire.errors import MessageError
-from rigwatch.wire.messages import columns_of, concatenate, continues, decode_all, packed, pieces
+from rigwatch.wire.messages import (
+    columns_of,
+    concatenate,
+    continues,
+    cut,
+    decode_all,
+    merged,
+    packed,
+    pieces,
+)
 from rigwatch.wire.messages import decode as quick_decode
 from rigwatch.wire.messages import encode as quick_encode
 from rigwatch.wire.messages.message_types import Column, ColumnTable, EstimateBlock, SampleBlock
 from rigwatch.wire.messages.packed import decode_block
 from rigwatch.wire.messages.packed_encoding import LENGTHS_KEPT, _around
 from rigwatch.wire.messages.protobuf import decode, encode
+from rigwatch.wire.session.joined_blocks import joined_blocks
 
 Block = SampleBlock | EstimateBlock
 NAMES = st.sampled_from(["voltage", "position", "", "θ1", "x" * 200])
@@ -103,6 +115,57 @@ def test_blocks_that_wait_together_are_joined_as_single_ones_would_be(
         for column in columns_of(block):
             assert column.values.flags.writeable
             assert column.values.flags.aligned
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(blocks(), min_size=1, max_size=3), st.integers(1, 9), st.data())
+def test_blocks_of_a_recording_are_those_read_one_by_one(
+    several: list[Block], size: int, draw: st.DataObject
+) -> None:
+    kind = type(several[0])
+    parts = [part for block in several if type(block) is kind for part in pieces(block, size)]
+    kept = [part for part in parts if draw.draw(st.integers(0, 19))]
+    payloads = [encode(part) for part in kept]
+    at_once = list(joined_blocks(kind, payloads, draw.draw(st.sampled_from([1, 50, 10_000]))))
+    one_by_one = merged([decode_block(kind, data) for data in payloads], 10_000)  # type: ignore[type-var]
+    expected = [encode(block) for block in one_by_one]
+    assert [encode(block) for block in merged(at_once, 10_000)] == expected  # type: ignore[type-var]
+
+
+def test_recorded_blocks_of_changing_lengths_are_joined_at_once() -> None:
+    lengths = [102, 103] * 20
+    begins = np.cumsum([0, *lengths])
+    whole = _samples(begins[-1])
+    payloads = [encode(cut(whole, *span)) for span in pairwise(begins.tolist())]
+    (block,) = joined_blocks(SampleBlock, payloads, len(whole))
+    assert encode(block) == encode(whole)
+
+
+@pytest.mark.parametrize("place", [0, 5, 19])
+def test_of_recorded_blocks_that_follow_only_a_strange_one_stands_alone(place: int) -> None:
+    whole = _samples(200)
+    payloads = [encode(part) for part in pieces(whole, 10)]
+    strange = replace(cut(whole, 10 * place, 10 * place + 10), device="gir")
+    payloads[place] = encode(strange)
+    found = list(joined_blocks(SampleBlock, payloads, 1000))
+    assert [len(block) for block in found if block.device == "gir"] == [10]
+    assert sum(map(len, found)) == len(whole)
+
+
+def test_a_recorded_block_that_is_none_is_refused_as_it_comes() -> None:
+    payloads = [encode(part) for part in pieces(_samples(200), 10)]
+    at = bytes(payloads[7]).index(b"voltage")
+    payloads[7] = payloads[7][: at - 2] + b"\xff\xff" + payloads[7][at:]
+    with pytest.raises(MessageError):
+        list(joined_blocks(SampleBlock, payloads, 1000))
+
+
+def _samples(n: int) -> SampleBlock:
+    """Samples from number 1000 on, whose numbers take two bytes."""
+    numbers = np.arange(n, dtype=np.int64)
+    quality = (numbers % 7).astype(np.uint8)
+    columns = (Column("voltage", "V", np.sin(numbers), quality), Column("x", "m", np.cos(numbers)))
+    return SampleBlock("rig", 5, 1000, numbers, 10 * numbers, columns)
 
 
 def test_devices_that_measure_the_same_share_a_layout() -> None:

@@ -7,6 +7,7 @@ how many samples a message holds.
 """
 
 from rigwatch.wire.messages import blocks, protobuf_schema, quality_flags
+from rigwatch.wire.messages.block_decoding import Numbers, block_of
 from rigwatch.wire.messages.block_size import BlockSize
 from rigwatch.wire.messages.blocks import (
     Block,
@@ -20,6 +21,7 @@ from rigwatch.wire.messages.blocks import (
 )
 from rigwatch.wire.messages.codec import decode, decode_all, encode
 from rigwatch.wire.messages.json_fields import json_fields
+from rigwatch.wire.messages.layout import Layout
 from rigwatch.wire.messages.message_types import (
     EVERY_ALARM,
     LONGEST_NAME,
@@ -46,7 +48,7 @@ from rigwatch.wire.messages.message_types import (
     Severity,
 )
 from rigwatch.wire.messages.newest_alarms import MOST_ALARMS, remember
-from rigwatch.wire.messages.packed import decode_block
+from rigwatch.wire.messages.packed import UNFAMILIAR, decode_block, layout_of
 from rigwatch.wire.messages.quality_flags import (
     NON_FINITE,
     RESAMPLED,
@@ -104,6 +106,7 @@ __all__ = [
     "SPIKE",
     "STALE",
     "TOPICS",
+    "UNFAMILIAR",
     "Alarm",
     "AlarmCommand",
     "AlarmState",
@@ -117,12 +120,15 @@ __all__ = [
     "Gap",
     "Health",
     "Identity",
+    "Layout",
     "Message",
     "ModelChange",
+    "Numbers",
     "RunInfo",
     "SampleBlock",
     "Severity",
     "Topic",
+    "block_of",
     "blocks",
     "bus_key",
     "columns_of",
@@ -134,6 +140,7 @@ __all__ = [
     "decode_block",
     "encode",
     "json_fields",
+    "layout_of",
     "merged",
     "pieces",
     "protobuf_schema",

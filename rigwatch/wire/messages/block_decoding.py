@@ -95,18 +95,31 @@ def _follows(one: _Part, other: _Part) -> bool:
 
 def _block(kind: type[K], run: Sequence[_Part]) -> K:
     first = run[0]
-    times, values, quality = _numbers(run[0]) if len(run) == 1 else _joined(run)
-    if kind is EstimateBlock and first.layout.plain_names:
-        table = ColumnTable(first.layout.plain_names, values)
-        return kind(first.device, first.boot, first.seq, times[0], table)  # type: ignore[call-arg, arg-type]
+    numbers = _numbers(first) if len(run) == 1 else _joined(run)
+    return block_of(kind, first.layout, (first.device, first.boot, first.seq), numbers)
+
+
+def block_of(kind: type[K], layout: Layout, head: tuple[str, int, int], numbers: Numbers) -> K:
+    """A block of these numbers, with the names of the layout's columns.
+
+    Args:
+        kind: of the block.
+        layout: of its first bytes.
+        head: its device, boot and first number.
+        numbers: as many as it has samples.
+    """
+    times, values, quality = numbers
+    if kind is EstimateBlock and layout.plain_names:
+        table = ColumnTable(layout.plain_names, values)
+        return kind(*head, times[0], table)  # type: ignore[call-arg, arg-type]
     rows, flags = iter(values), iter(quality)
     columns = tuple(
         [
             Column(name, unit, next(rows), next(flags) if judged else NO_QUALITY)
-            for name, unit, judged in first.layout.names
+            for name, unit, judged in layout.names
         ]
     )
-    return kind(first.device, first.boot, first.seq, *times, columns)  # type: ignore[call-arg]
+    return kind(*head, *times, columns)  # type: ignore[call-arg]
 
 
 def _numbers(part: _Part) -> Numbers:

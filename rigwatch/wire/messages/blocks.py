@@ -135,7 +135,7 @@ def merged(blocks: Iterable[B], size: int) -> Iterator[B]:
 
     A block that does not continue its predecessor starts a new one, so that every gap, restart of
     the device and change of columns falls between two blocks. Memory is that of one merged block,
-    whose arrays are its own.
+    whose arrays are its own or those of the only one that it consists of.
     """
     run: list[B] = []
     length = 0
@@ -143,12 +143,18 @@ def merged(blocks: Iterable[B], size: int) -> Iterator[B]:
         if not len(block):
             continue
         if run and (length >= size or not continues(run[-1], block)):
-            yield _joined(run)
+            yield _with_own_arrays(run)
             run, length = [], 0
         run.append(block)
         length += len(block)
     if run:
-        yield _joined(run)
+        yield _with_own_arrays(run)
+
+
+def _with_own_arrays(run: Sequence[B]) -> B:
+    """The blocks as one; a single one is copied only if it is a view of received bytes."""
+    alone = len(run) == 1 and run[0].t_ns.flags.writeable
+    return run[0] if alone else _joined(run)
 
 
 def unseen(block: B, next_seq: int | None) -> B | None:

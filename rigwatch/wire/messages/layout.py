@@ -6,10 +6,14 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from rigwatch.wire.arrays import IntArray
+
 _EIGHT = 8
 """Size of a time or value [bytes]."""
 NUMBERS_KEPT = 512
 """Numbers whose bytes are remembered: a boot comes with each of its blocks."""
+_LONGEST_NUMBER = 9
+"""Bytes of a number of 63 bits, the longest that `Layout.first_numbers` reads."""
 Span = tuple[int, int]
 
 
@@ -69,6 +73,30 @@ class Layout:
         """Offsets of the quality of the columns that have it; shape (columns, samples)."""
         starts = [place.quality for place in self.columns if place.quality >= 0]
         return np.add.outer(np.array(starts, np.intp), np.arange(self.samples))
+
+    @cached_property
+    def shared(self) -> NDArray[np.intp]:
+        """Offsets of all bytes that blocks of one boot share: those but `seq` and the arrays."""
+        spans = [(start, start + len(part)) for start, part in self.fixed]
+        spans += [span for span in (self.device, self.boot) if span is not None]
+        return np.concatenate([np.arange(*span) for span in spans])
+
+    def first_numbers(self, raw: NDArray[np.uint8]) -> tuple[IntArray, NDArray[np.bool_]]:
+        """`seq` of each of several blocks, and whether it is one that fills its place.
+
+        Args:
+            raw: the bytes of a block in each row, which has this layout, shape (m, any).
+        """
+        if self.seq is None:
+            return np.zeros(len(raw), np.int64), np.ones(len(raw), np.bool_)
+        parts = raw[:, slice(*self.seq)]
+        width = parts.shape[1]
+        if width > _LONGEST_NUMBER:
+            return np.zeros(len(raw), np.int64), np.zeros(len(raw), np.bool_)
+        ends = ((parts >> 7) == (np.arange(width) < width - 1)).all(axis=1)
+        bits = (parts & 0x7F).astype(np.int64) << 7 * np.arange(width)
+        value = bits.sum(axis=1)
+        return (value >> 1) ^ -(value & 1), ends
 
     def head(self, data: bytes) -> tuple[str, int, int]:
         """Device, boot and number of the first sample.

@@ -50,18 +50,20 @@ class ChunkReader:
         self._others = 0
         self._left = BASE + RATIO * _size(path)
 
-    def messages(self, records: bytes) -> Iterator[tuple[Topic, int, bytes]]:
-        """Topic, time and bytes of each message.
+    def messages(
+        self, records: bytes, wanted: Topic | None = None
+    ) -> Iterator[tuple[Topic, int, bytes]]:
+        """Topic, time and bytes of each message; no bytes of others than `wanted`, if it is given.
 
         Raises:
             SessionError: a record with a right checksum is malformed, or has a later version.
         """
         try:
-            yield from self._cut(records)
+            yield from self._cut(records, wanted)
         except (struct.error, McapError, ValueError, RecursionError) as error:
             raise SessionError(f"{self._path}: a malformed record: {error}") from None
 
-    def _cut(self, records: bytes) -> Iterator[tuple[Topic, int, bytes]]:
+    def _cut(self, records: bytes, wanted: Topic | None) -> Iterator[tuple[Topic, int, bytes]]:
         at, end = 0, len(records)
         while at + _RECORD.size <= end:
             opcode, length = _RECORD.unpack_from(records, at)
@@ -73,7 +75,9 @@ class ChunkReader:
                 number, _, t_ns, _ = _MESSAGE_HEAD.unpack_from(records, at)
                 line = self._line(number)
                 if line is not None:
-                    yield line, t_ns, records[at + _MESSAGE_HEAD.size : at + length]
+                    kept = wanted is None or line is wanted
+                    begin = at + _MESSAGE_HEAD.size
+                    yield line, t_ns, records[begin : at + length] if kept else b""
                 else:
                     self._left -= length
             elif opcode == _SCHEMA:

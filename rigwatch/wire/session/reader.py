@@ -5,7 +5,7 @@
     for span in session.lost: …
 
 All intact data are delivered, every checksum is verified, and unreadable parts are listed in
-`lost`. Memory use is one chunk and one merged block, for any length of the recording.
+`lost`. Memory use is one chunk and a few merged blocks, for any length of the recording.
 """
 
 from collections.abc import Iterable, Iterator
@@ -31,6 +31,7 @@ from rigwatch.wire.messages import (
 )
 from rigwatch.wire.session.chunk_reader import ChunkReader
 from rigwatch.wire.session.chunks import Damage, ends_closed, scan
+from rigwatch.wire.session.joined_blocks import joined_blocks
 from rigwatch.wire.session.segment import SUFFIX
 from rigwatch.wire.session.statistics import topic_counts
 from rigwatch.wire.session.writer import message_time
@@ -201,34 +202,44 @@ class Session:
     def _merged(
         self, line: Topic, device: str | None, start: int | None, end: int | None, size: int
     ) -> Iterator[Any]:
-        return blocks.merged(self._blocks(line, device, start, end), size)
+        return blocks.merged(self._blocks(line, device, start, end, size), size)
 
     def _blocks(
-        self, line: Topic, device: str | None, start: int | None, end: int | None
+        self, line: Topic, device: str | None, start: int | None, end: int | None, size: int
     ) -> Iterator[Any]:
         """Blocks of one topic, each sample once."""
         following: dict[tuple[str, int], int] = {}
-        for index in range(len(self.segments)):
-            for found, _, data in self._records(index):
-                if found is not line:
-                    continue
-                block = self._block(line, data)
-                if device is not None and block.device != device:
-                    continue
-                key = (block.device, block.boot)
-                block = blocks.unseen(block, following.get(key))
-                if block is None:
-                    continue
-                following[key] = block.seq + len(block)
-                if start is not None or end is not None:
-                    block = blocks.between(block, start, end)
-                if block is not None:
-                    yield block
+        # A clock may step between two blocks, so a span is taken out of each of them.
+        spanned = start is not None or end is not None
+        for whole in self._decoded(line, 1 if spanned else size):
+            if device is not None and whole.device != device:
+                continue
+            key = (whole.device, whole.boot)
+            block = blocks.unseen(whole, following.get(key))
+            if block is None:
+                continue
+            following[key] = block.seq + len(block)
+            part = blocks.between(block, start, end) if spanned else block
+            if part is not None:
+                yield part
+
+    def _decoded(self, line: Topic, size: int) -> Iterator[Any]:
+        """All blocks of one topic, joined up to `size` samples."""
+        try:
+            for index in range(len(self.segments)):
+                found = self._records(index, wanted=line)
+                payloads = (data for topic, _, data in found if topic is line)
+                yield from joined_blocks(line.message, payloads, size)  # type: ignore[type-var]
+        except MessageError as error:
+            raise SessionError(f"{self.path}: {error}") from error
 
     def _records(
-        self, index: int, foreign: set[str] | None = None
+        self, index: int, foreign: set[str] | None = None, wanted: Topic | None = None
     ) -> Iterator[tuple[Topic, int, bytes]]:
-        """Topic, time and bytes of every message of one segment; records damage."""
+        """Topic, time and bytes of every message of one segment; records damage.
+
+        There are no bytes of other topics than `wanted`, if it is given.
+        """
         reader = ChunkReader(self.segments[index], set() if foreign is None else foreign)
         damage: list[Damage] = []
         last: int | None = None
@@ -237,7 +248,7 @@ class Session:
                 if isinstance(item, Damage):
                     damage.append(item)
                     continue
-                for line, t_ns, data in reader.messages(item.records):
+                for line, t_ns, data in reader.messages(item.records, wanted):
                     if damage:
                         self._note(index, damage, last, t_ns)
                         damage = []
