@@ -47,7 +47,7 @@ def _scores(
     """Plays the parts, prints them recording by recording, returns the counts of right results."""
     scores = []
     if "watch" in parts:
-        watch = watched(rig)
+        watch = watched(rig, weighed=chosen.weighed)
         print(*watch.lines, f"{rig.recordings.name} watch: {watch.summary()}", sep="\n", flush=True)
         watch.tally.count("other faults not called friction", right=not watch.miscalled)
         scores.append(("watch", watch.tally))
@@ -81,7 +81,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--models", nargs="+", default=["servo-pneumatic", "fourth-order"], help="bases of explain"
     )
-    parser.add_argument("--weighed", action="store_true", help="tell studies the mass, within 1 %%")
+    parser.add_argument("--weighed", action="store_true", help="state the mass, within 1 %%")
     parser.add_argument("--write-only", action="store_true", help="write, do not play")
     return parser
 

@@ -76,13 +76,20 @@ class RigFolder:
                 raise RuntimeError(f"import {source}: {run.stderr.strip()}")
         return session
 
-    def commission(self, model: Path) -> subprocess.CompletedProcess[str]:
-        """`rigwatch commission` from the chirp and all recordings with a locked generator."""
+    def commission(self, model: Path, *, weighed: bool = False) -> subprocess.CompletedProcess[str]:
+        """`rigwatch commission` from the chirp and all recordings with a locked generator.
+
+        Args:
+            model: the file that is written.
+            weighed: state the moving mass.
+        """
         words: list[str | Path] = ["--chirp", self.session("watch", "chirp")]
         for name in self.truth("watch"):
             role = name.partition("_")[0]
             if role in {"healthy", "friction"} and not name.endswith("_free"):
                 words += [f"--{role}", self.session("watch", name)]
+        if weighed and (mass := self.weighed()):
+            words += ["--set", f"m={mass}"]
         return command("commission", "--output", model, *words)
 
 

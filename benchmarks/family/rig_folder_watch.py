@@ -3,7 +3,7 @@
 Commissioning gets the chirp and the recordings `healthy_*` and `friction_*` with the generator
 locked. Hard excitations (`hard_*`) are counted separately. Where the truth states a constant dry
 friction, the force that the name comes with is compared with it; no recording shows the moving
-mass, so that the force is off by as much as the mass in the model.
+mass, so that the force is off by as much as the mass in the model unless it is stated.
 """
 
 import statistics
@@ -62,13 +62,18 @@ def _median(figures: list[float]) -> str:
     return f"{statistics.median(figures):.0f}" if figures else "-"
 
 
-def watched(rig: RigFolder) -> Watched:
-    """Commissions, replays every recording of `watch` and counts."""
+def watched(rig: RigFolder, *, weighed: bool = False) -> Watched:
+    """Commissions, replays every recording of `watch` and counts.
+
+    Args:
+        rig: its recordings.
+        weighed: state the moving mass when commissioning.
+    """
     found = Watched()
     truth = rig.truth("watch")
     model = rig.work / "model.toml"
     model.unlink(missing_ok=True)
-    run = rig.commission(model)
+    run = rig.commission(model, weighed=weighed)
     if run.returncode:
         found.lines.append(f"commission: {run.stderr.strip()[-300:]}")
     for name, told in truth.items():

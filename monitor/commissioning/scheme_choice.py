@@ -5,7 +5,7 @@ excitation. Otherwise the thesis's scheme is used, which needs no equations of t
 that it arms on the healthy recordings and raises no alarm there.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -46,8 +46,18 @@ def commission_best(
     scheme: Scheme = "auto",
     equations: str = EQUATIONS,
     say: Callable[[str], None] = lambda _: None,
+    *,
+    stated: Mapping[str, float] | None = None,
 ) -> RigModel:
     """The model of a rig for the scheme that describes it, or for the requested scheme.
+
+    Args:
+        recordings: of all roles.
+        settings: of the transfer function's scheme.
+        scheme: which one; `auto` chooses.
+        equations: name of a shipped model, or its file.
+        say: called with one line at each step.
+        stated: parameters of the equations that are known, in SI.
 
     Raises:
         ModelError: recordings are missing or inconsistent, or no scheme describes the healthy rig.
@@ -60,7 +70,7 @@ def commission_best(
         transfer, why = _transfer(recordings, settings)
         say(f"{why}; fitting the equations of {equations}")
     try:
-        found = commission_equations(recordings, equations, say=say)
+        found = commission_equations(recordings, equations, say, stated)
     except ModelError as error:
         if transfer is None:
             raise ModelError(f"{why}; {error}" if scheme == "auto" else str(error)) from error

@@ -134,8 +134,9 @@ def dry_force(
 
     A steady motion hardly distinguishes viscous friction from it, and a joint fit would assign to
     viscous friction what smoothing and presliding round off. Friction is noticed a little after it
-    begins: of the windows that end now, the second force is of that in which it explains most
-    energy (a change point by maximum likelihood). Samples from before would make it appear smaller.
+    begins: of the instants at which it may have begun, the second force is of that from which on
+    friction explains most energy (a change point by maximum likelihood). Samples from before would
+    make it appear smaller.
     Over a whole window the sample before a reversal counts: the high-passed force is largest there,
     and without it strong friction appears a tenth smaller.
 
@@ -146,27 +147,31 @@ def dry_force(
         high_pass: of the judged signals, see `DecisionRules`.
     """
     n = min(length, kept.counts[FILLED])
-    a = p = most = acting = 0.0
-    start = n
+    a = p = 0.0
     for ago in range(1, n + 1):
         if _slides(kept, ago):
             row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
             a += row[DRY] * row[DRY]
             p += row[DRY] * row[ERROR]
-        if ago >= min(surely, n) and a > 0.0 and p * abs(p) > most * a:
-            most, acting, start = p * p / a, p / a, ago
-    if most > 0.0 and surely < n:
-        acting = _force_since(kept, start, high_pass)
-    return p / a if a > 0.0 else 0.0, acting
+    whole = p / a if a > 0.0 else 0.0
+    if surely >= n:
+        return whole, whole
+    most = acting = 0.0
+    for start in range(surely, n + 1):
+        force, explained = _force_since(kept, start, high_pass)
+        if force > 0.0 and explained > most:
+            most, acting = explained, force
+    return whole, acting
 
 
 @part(allocates=True)
-def _force_since(kept: DecisionState, start: int, high_pass: FloatArray) -> float:
-    """Force of dry friction that begins with the sample `start` ago [N].
+def _force_since(kept: DecisionState, start: int, high_pass: FloatArray) -> tuple[float, float]:
+    """Force of dry friction that begins with the sample `start` ago [N], and what it explains.
 
     A high-passed force that reverses is twice the step with which one begins that was not there:
     compared with the response to friction that has always acted, friction that has just begun
-    would appear half as large until the high-pass has forgotten.
+    would appear half as large until the high-pass has forgotten, and its beginning earlier than it
+    is.
     """
     a = p = 0.0
     state = np.zeros(high_pass.shape[1] - 1)
@@ -176,7 +181,7 @@ def _force_since(kept: DecisionState, start: int, high_pass: FloatArray) -> floa
         if _slides_on(kept, ago):
             a += unit * unit
             p += unit * row[ERROR]
-    return p / a if a > 0.0 else 0.0
+    return (p / a, p * p / a) if a > 0.0 else (0.0, 0.0)
 
 
 @part()

@@ -12,12 +12,14 @@ from monitor.observer.decision_state import (
     ERROR,
     HISTORY,
     PASSED,
+    SHORT,
     SPEED,
     WET,
     DecisionState,
     new_state,
 )
 from monitor.observer.missing_force import high_pass
+from rigwatch.wire.arrays import FloatArray
 from tests.compiled import from_python
 
 dry_force = from_python(window_statistics.dry_force)
@@ -26,9 +28,9 @@ friction = from_python(window_statistics.friction)
 FORCE, LENGTH = 0.6, 64
 
 
-def swinging() -> DecisionState:
-    """Rows of a motion that reverses every 16 samples."""
-    speed = np.sin(2.0 * np.pi * (np.arange(HISTORY) + 0.3) / 32.0)
+def swinging(period: int = 32) -> DecisionState:
+    """Rows of a motion that reverses every half period [samples]."""
+    speed = np.sin(2.0 * np.pi * (np.arange(HISTORY) + 0.3) / period)
     kept = new_state(1)
     kept.rows[:, SPEED], kept.rows[:, WET], kept.rows[:, BARE] = speed, -speed, -np.sign(speed)
     kept.counts[AT.filled] = HISTORY
@@ -58,17 +60,37 @@ def test_friction_is_told_from_viscous_friction_wherever_it_turns(late: int) -> 
     assert share == pytest.approx(1.0, abs=1e-3)
 
 
-@pytest.mark.parametrize("begun", [20, 32, 44])
-def test_friction_that_has_just_begun_is_not_told_half_as_large(begun: int) -> None:
-    kept = swinging()
-    corner = high_pass(2.0, 256.0)
+def begins(begun: int, period: int) -> tuple[DecisionState, FloatArray]:
+    """Dry friction in the newest samples, after a healthy motion, and the high-pass."""
+    kept = swinging(period)
+    corner = np.array(high_pass(2.0, 256.0))
     bare = kept.rows[:, BARE]
-    always = np.concatenate([np.tile(bare[:32], 8), bare])
+    always = np.concatenate([np.tile(bare[:period], 8), bare])
     kept.rows[:, DRY] = lfilter(*corner, always)[-HISTORY:]
     acts = np.arange(HISTORY) >= HISTORY - begun
     kept.rows[:, ERROR] = FORCE * lfilter(*corner, np.where(acts, bare, 0.0))
+    return kept, corner
 
-    _, acting = dry_force(kept, begun - 4, LENGTH, np.array(corner))
+
+@pytest.mark.parametrize("begun", [20, 32, 44])
+def test_friction_that_has_just_begun_is_not_told_half_as_large(begun: int) -> None:
+    kept, corner = begins(begun, 32)
+
+    _, acting = dry_force(kept, begun - 4, LENGTH, corner)
+
+    assert acting == pytest.approx(FORCE, rel=0.05)
+
+
+@pytest.mark.parametrize("noticed", [0, 2, 4])
+@pytest.mark.parametrize("before", [2, 3, 5])
+def test_friction_that_begins_shortly_before_a_slow_reversal_has_its_force(
+    before: int, noticed: int
+) -> None:
+    slow, since_reversal = 76, 16
+    begun = before + since_reversal
+    kept, corner = begins(begun, slow)
+
+    _, acting = dry_force(kept, begun - noticed, begun - noticed + SHORT, corner)
 
     assert acting == pytest.approx(FORCE, rel=0.05)
 

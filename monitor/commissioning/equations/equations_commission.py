@@ -7,7 +7,7 @@ The equations are fitted to the first part of each recording; their residual on 
 whether they describe the rig. No recording of a fault is needed.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -43,6 +43,7 @@ def commission_equations(
     recordings: Sequence[Recording],
     name: str = EQUATIONS,
     say: Callable[[str], None] = lambda _: None,
+    stated: Mapping[str, float] | None = None,
 ) -> RigModel:
     """The model file of the observer scheme.
 
@@ -50,6 +51,7 @@ def commission_equations(
         recordings: chirps and healthy ones; others are not used.
         name: of a shipped model, or its file.
         say: called with one line at each step.
+        stated: parameters that are known, in SI.
 
     Raises:
         ModelError: there is no healthy recording, rates differ, a recording is short or at rest,
@@ -63,12 +65,14 @@ def commission_equations(
         raise ModelError(f"commissioning: found sample rates {sorted(rates)} Hz, expected one")
     rate = rates.pop()
     check_moves(used, [state.channel for state in measured_states(base_model(name))])
+    known = stated or {}
     readings, seem = [False] * len(used), _seem_to_jitter(used, name, rate)
     if seem == readings:
-        return _commissioned(used, name, rate, readings, say=say)
+        return _commissioned(used, name, rate, readings, known, say=say)
     say("the drive's steps may jitter: fitting without and with it")
     return _quieter(
-        partial(_commissioned, used, name, rate, jitters, say=say) for jitters in (readings, seem)
+        partial(_commissioned, used, name, rate, jitters, known, say=say)
+        for jitters in (readings, seem)
     )
 
 
@@ -108,6 +112,7 @@ def _commissioned(
     name: str,
     rate: float,
     jitters: Sequence[bool],
+    stated: Mapping[str, float],
     *,
     say: Callable[[str], None],
 ) -> RigModel:
@@ -118,13 +123,14 @@ def _commissioned(
         name: of the equations.
         rate: sample rate [Hz].
         jitters: of which recordings the inputs' steps jitter.
+        stated: parameters that are known, in SI.
         say: called with one line at each step.
 
     Raises:
         ModelError: the equations do not describe the rig, or a recording is not healthy.
     """
     say("1 of 3: parameters of the equations")
-    plant = fitted_equations(used, name, CORNER, rate, jitters)
+    plant = fitted_equations(used, name, CORNER, rate, jitters, stated)
     say("2 of 3: what the healthy rig leaves of them")
     try:
         parts, roles, remainder, scheme = healthy_remainder(used, plant, rate, jitters)

@@ -1,6 +1,6 @@
 """Parameters of the equations from the first part of each healthy recording."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.signal import savgol_coeffs
@@ -35,10 +35,24 @@ def half_width_of(name: str) -> int:
     return EquationsPlant(model=name, names=(), values=(), port="").half_width
 
 
-def fitted_equations(
-    used: Sequence[Recording], name: str, corner: float, rate: float, jitters: Sequence[bool]
+def fitted_equations(  # noqa: PLR0917 -- all that is known
+    used: Sequence[Recording],
+    name: str,
+    corner: float,
+    rate: float,
+    jitters: Sequence[bool],
+    stated: Mapping[str, float],
 ) -> EquationsPlant:
-    """The equations with parameters from the first part of each recording."""
+    """The equations with parameters from the first part of each recording.
+
+    Args:
+        used: recordings.
+        name: of the equations.
+        corner: of the high-pass [Hz].
+        rate: sample rate [Hz].
+        jitters: of which recordings the inputs' steps jitter.
+        stated: parameters that are known, in SI.
+    """
     model = base_model(name)
     port = force_port(model)
     layout = layout_of(model, port)
@@ -50,6 +64,7 @@ def fitted_equations(
     ]
     n = layout.inputs
     known = fit_sensor(model, [(m[:, :n], m[:, n], m[:, n + 1]) for m in moved], rate)
+    known |= stated
     stretches = [
         _cut(m, layout, round((CHIRP if one.role == "chirp" else FITTED) * rate))
         for one, m in zip(used, moved, strict=True)

@@ -16,7 +16,9 @@ TRANSFER_S, EQUATIONS_S = (3.0, 3.0), (10.0, 65.0)
 HELP = "create the monitor's model file from commissioning recordings"
 EXAMPLE = (
     "  rigwatch commission --chirp sessions/chirp --healthy sessions/healthy "
-    "--friction sessions/known-friction --output configs/bench1-model.toml"
+    "--friction sessions/known-friction --output configs/bench1-model.toml\n"
+    "  rigwatch commission --healthy sessions/sine --scheme equations --set m=0.31 "
+    "--output configs/bench1-model.toml"
 )
 
 
@@ -57,6 +59,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="name of a shipped model or a model file, for --scheme equations and auto",
     )
     parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="a parameter of the equations that you know, in its unit, such as the moving mass "
+        "that you have weighed: forces are in proportion to it",
+    )
+    parser.add_argument(
         "--any-wiring",
         action="store_true",
         help="commission although position and acceleration do not show one motion",
@@ -78,6 +88,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0 if the model file is written."""
     check_place(arguments.output)
+    stated = _stated(arguments)
     recordings = _recordings(arguments)
     from monitor.commissioning import CommissionSettings, commission_best
     from monitor.signals import commission_inertia
@@ -93,13 +104,38 @@ def run(arguments: argparse.Namespace) -> int:
         settings = CommissionSettings(
             band=tuple(arguments.band), window=arguments.window or 32, hop=arguments.hop
         )
-        model = commission_best(recordings, settings, arguments.scheme, arguments.equations, say)
+        model = commission_best(
+            recordings, settings, arguments.scheme, arguments.equations, say, stated=stated
+        )
     kept = install_model(arguments.output, model)
     if kept:
         say(f"the model before is {kept}")
     summary = _summary(model, arguments.output)
     print_result(arguments, summary, (f"{key}: {value}" for key, value in summary.items()))
     return 0
+
+
+def _stated(arguments: argparse.Namespace) -> dict[str, float]:
+    """The values of `--set`, in SI.
+
+    Raises:
+        ModelError: one is not NAME=VALUE, no parameter of the equations, or out of its bounds.
+    """
+    from monitor.commissioning import stated_in_si
+    from rigwatch.wire.errors import ModelError
+
+    if not arguments.set:
+        return {}
+    if arguments.scheme == "transfer" or arguments.plant == "inertia":
+        raise ModelError("--set: found no model of equations, expected --scheme equations or auto")
+    stated = {}
+    for text in arguments.set:
+        name, _, value = (part.strip() for part in text.partition("="))
+        try:
+            stated[name] = float(value)
+        except ValueError:
+            raise ModelError(f"--set: found {text!r}, expected NAME=VALUE such as m=0.31") from None
+    return stated_in_si(arguments.equations, stated)
 
 
 def _recordings(arguments: argparse.Namespace) -> "list[Recording]":
