@@ -14,7 +14,7 @@ from rigwatch.commands.common.output import say
 from rigwatch.wire.errors import ModelError
 
 if TYPE_CHECKING:
-    from rigwatch.physics.engine.equations import Model
+    from rigwatch.physics.engine.equations import Input, Model, Output
 
 LOGS = (".csv", ".mat", ".parquet", ".json")
 """Suffixes of the files in the working folder that are offered as logs."""
@@ -67,7 +67,8 @@ def _columns(columns: Iterable[str], model: "Model", given: Collection[str]) -> 
     from rigwatch.workbench.steps import suggested
 
     likely, found = suggested([*columns], model), list[str]()
-    for name, signal in {**model.inputs, **model.outputs}.items():
+    signals: dict[str, Input | Output] = {**model.inputs, **model.outputs}
+    for name, signal in signals.items():
         channel, unit = signal.channel or name, signal.shown or signal.unit
         if channel in given:
             continue

@@ -78,7 +78,8 @@ def suggested(columns: Sequence[str], model: Model) -> dict[str, str]:
     headers = [read_header(column) for column in columns]
     time = _time_of(headers, (), model, counted=False)
     free, found = [h for h in headers if h is not time], dict[str, str]()
-    for name, signal in {**model.inputs, **model.outputs}.items():
+    signals: dict[str, Input | Output] = {**model.inputs, **model.outputs}
+    for name, signal in signals.items():
         channel = signal.channel or name
         column = _column(name, channel, signal, free)
         if column is None:
