@@ -70,7 +70,7 @@ def test_a_sub_command_that_is_missing_or_unknown_is_refused(
     for words, told in (
         (["study", "nwe", "emps"], "found command 'nwe'; did you mean 'new'?"),
         (["dmo"], "found command 'dmo'; did you mean 'demo' or 'undo' or 'model'?"),
-        (["--json", "xyz"], "found command 'xyz', expected one of ack, add, "),
+        (["--json", "xyz"], "found command 'xyz', expected one of accept, ack, add, "),
     ):
         assert main(words) == 2
         assert capsys.readouterr().err.startswith(f"rigwatch: {told}")
