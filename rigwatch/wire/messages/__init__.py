@@ -1,9 +1,9 @@
 """Messages on the bus and in session files: their types, encoding and topics.
 
 `message_types` declares every message, `protobuf` turns it into bytes, `topics` is the
-table of topics. `packed` reads the arrays of long blocks in place, `gathered` those of short ones
-in one go. `blocks` cuts and joins blocks of samples without touching a value; `block_size` tells
-how many samples a message holds.
+table of topics. `packed` reads the arrays of long blocks in place, `block_decoding` those of short
+ones in one go; `Layout` says where they lie. `blocks` cuts and joins blocks of samples without
+touching a value; `block_size` tells how many samples a message holds.
 """
 
 from rigwatch.wire.messages import blocks, protobuf_schema, quality_flags

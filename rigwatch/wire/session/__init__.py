@@ -1,7 +1,7 @@
 """Session files: MCAP recordings that survive kill -9 and report what is missing.
 
-`SessionWriter` writes, `open_session` opens and salvages, `edit` trims and recovers, `summary`
-describes.
+`SessionWriter` writes, `open_session` opens and salvages, `joined_blocks` decodes many blocks at
+once, `edit` trims and recovers, `summary` describes.
 """
 
 from rigwatch.wire.session.edit import (

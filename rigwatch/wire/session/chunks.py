@@ -188,10 +188,18 @@ def _check_other(opcode: int, body: bytes) -> None:
 
 def _check_length(file: BinaryIO, offset: int, body: bytes, size: int) -> None:
     """Raise if a whole chunk begins within a record, which its length must not span."""
-    inside = _candidates(body, offset + RECORD.size)
-    if any(_chunk_at(file, candidate, size) for candidate in inside if candidate > offset):
+    begin = offset + RECORD.size
+    # An index of each chunk names its packing, too: the file is asked only where one may begin.
+    inside = [
+        candidate
+        for candidate in _candidates(body, begin)
+        if candidate > offset and (candidate < begin or body[candidate - begin] == CHUNK)
+    ]
+    if not inside:
+        return
+    if any(_chunk_at(file, candidate, size) for candidate in inside):
         raise DamagedError("a record of a damaged length")
-    file.seek(offset + RECORD.size + len(body))
+    file.seek(begin + len(body))
 
 
 def next_chunk(file: BinaryIO, start: int, size: int) -> int:
