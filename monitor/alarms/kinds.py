@@ -374,7 +374,7 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "not_judged",
         "warning",
-        "the motion is outside the range that commissioning covered; the rig is not judged",
+        "the motion is outside the range that commissioning covered; only dry friction is judged",
         "Return to a motion that commissioning covered, or commission again with a healthy "
         "recording of this one.",
         _PASSING,

@@ -16,6 +16,8 @@ SHORT, MEDIUM, LONG, LASTING = 8, 32, 128, 256
 RISING = 2
 """Samples after a reversal during which real friction still changes sign."""
 HISTORY = LONG + RISING
+SUMS = 13
+"""Number of sums over a motion that was not recorded, see `window_statistics.add_unrecorded`."""
 WAKE = 256
 """Samples after a jump of a channel during which filters and hidden states settle."""
 
@@ -73,6 +75,7 @@ class DecisionState(NamedTuple):
         counts: see `Counts`; since_onset is -1 without an episode.
         value: verdict, named force, and energies of the drive recently and before.
         lasting: the last judged energies, relative to their limit, shape (LASTING,).
+        sums: over a motion that was not recorded, shape (SUMS,).
         lateness: of the inputs, see `input_lateness`.
         edges: of the inputs, see `monitor.drives.edge_choice`.
     """
@@ -81,6 +84,7 @@ class DecisionState(NamedTuple):
     counts: NDArray[np.int64]
     value: FloatArray
     lasting: FloatArray
+    sums: FloatArray
     lateness: FloatArray
     edges: FloatArray
 
@@ -95,8 +99,8 @@ def new_state(levels: int) -> DecisionState:
     count[AT.since_onset] = -1
     count[AT.since_jump] = WAKE
     rows = np.zeros((HISTORY, LEVELS + levels))
-    lasting = np.zeros(LASTING)
-    return DecisionState(rows, count, np.zeros(4), lasting, no_lateness(), no_edges())
+    lasting, sums = np.zeros(LASTING), np.zeros(SUMS)
+    return DecisionState(rows, count, np.zeros(4), lasting, sums, no_lateness(), no_edges())
 
 
 PASSED = np.array([[1.0, 0.0, 0.0]] * 2)

@@ -76,6 +76,8 @@ from monitor.observer.input_lateness import (
 from monitor.observer.lagged_motion import EMPTY, FIRST, TAINTED
 from monitor.observer.missing_force import DRY_BARE, LATE_UNIT, MOVED, UNSURE_INPUT, E
 from monitor.observer.window_statistics import (
+    SEEN,
+    add_unrecorded,
     drive_explains,
     dry_force,
     friction,
@@ -83,6 +85,7 @@ from monitor.observer.window_statistics import (
     mean_square,
     rest,
     reversals,
+    unrecorded_friction,
 )
 from monitor.signals import Codes, fill
 from rigwatch.wire.arrays import FloatArray
@@ -105,6 +108,10 @@ LEFT, LEFT_EARLY = 0.55, 0.8
 """Shares of the force of dry friction alone that must be left beside viscous friction, over longer
 windows and over those shorter than `MEDIUM`, which hardly tell the two apart: what grows with the
 speed, as drag, a saturated drive and a lost gain of it do, leaves less.
+"""
+LEFT_UNRECORDED, AGREED_UNRECORDED = 0.75, 64
+"""The first of these over seconds of a motion that was not recorded, and consecutive samples that
+must agree there: what the equations mispredict of faster or larger motion grows with the speed.
 """
 OUTDONE, NOISE = 3.0, 0.02
 """Ratio of the energy that friction leaves to that which a weaker drive leaves above which it is
@@ -315,11 +322,44 @@ def _one(  # noqa: PLR0917 -- a kernel
     mode = _mode(kept, rules)
     out[MODE, k] = mode
     count[WAS_JUDGING] = 1 if mode == JUDGING else 0
+    if mode != BEYOND and kept.sums[SEEN] > 0.0:
+        fill(kept.sums, 0.0)
     if mode != JUDGING:
         count[ONSET] = -1
         kept.value[0] = UNNAMED
+        if mode == BEYOND:
+            _unrecorded(k, spread, medium_limit, rules, kept, out)
         return
     _follow(k, away, spread, rules, kept, out)
+
+
+@part()
+def _unrecorded(  # noqa: PLR0917 -- a kernel
+    k: int,
+    spread: float,
+    limit: float,
+    rules: DecisionRules,
+    kept: DecisionState,
+    out: FloatArray,
+) -> None:
+    """Name dry friction at a motion that was not recorded.
+
+    How much a healthy rig leaves there is not known, but that it has no reason to reverse with the
+    motion: over many reversals, dry friction is told by its shape.
+    """
+    count = kept.counts
+    if kept.sums[SEEN] == 0.0:
+        count[AGREED] = 0
+    add_unrecorded(kept, spread, rules.speed_noise)
+    force, beside, share, dry, drive, energy = unrecorded_friction(kept)
+    fits = share > FITS and dry > DRY_PART and beside > LEFT_UNRECORDED * force
+    fits = fits and energy > SURELY_NEW**2 * limit
+    # Of a window in which a fault begins, neither explains the part before.
+    fits = fits and share > drive and 1.0 - share < OUTDONE * max(1.0 - drive, NOISE)
+    count[AGREED] = count[AGREED] + 1 if fits and force > 0.0 else 0
+    out[SHARE, k], out[DRY_SHARE, k] = share, dry
+    if count[AGREED] >= AGREED_UNRECORDED:
+        out[VERDICT, k], out[NAMED_FORCE, k] = FRICTION, force
 
 
 @part()

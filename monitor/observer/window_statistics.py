@@ -14,6 +14,7 @@ from monitor.observer.decision_state import (
     LASTING,
     RISING,
     SPEED,
+    SUMS,
     WET,
     DecisionState,
 )
@@ -21,6 +22,15 @@ from rigwatch.physics.transfer import filter_sample
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import part
 
+(
+    SEEN, USED, DRY_DRY, DRY_WET, WET_WET, DRY_ERROR, WET_ERROR, DRIVEN_DRIVEN, DRIVEN_ERROR,
+    ENERGY, HEALTHY, TURNS, SIDE,
+) = range(SUMS)  # fmt: skip
+"""Sums over a motion that was not recorded: its samples, those that count, products of columns,
+energies of the residual and of a healthy one, reversals, and the direction of the motion.
+"""
+UNRECORDED, FEWEST_TURNS = 256, 4.0
+"""Memory of these sums [samples], and reversals in it from which on they tell friction."""
 HEAD, FILLED, WAS_JUDGING, LASTED = 0, 1, 12, 13
 """Indices of `decision_state.Counts` as constants for the kernel."""
 BURST = 3.0
@@ -112,18 +122,39 @@ def friction(
         p += row[DRY] * row[ERROR]
         q += row[WET] * row[ERROR]
         yy += row[ERROR] * row[ERROR]
+    force, viscous, left, both, dry = _solved(a, b, c, p, q, yy, used * spread * spread)
+    return force, viscous, force * np.sqrt(left) / spread, both, dry
+
+
+@part()
+def _solved(  # noqa: PLR0917 -- sums
+    a: float, b: float, c: float, p: float, q: float, yy: float, healthy: float
+) -> tuple[float, float, float, float, float]:
+    """Coulomb force, viscous coefficient, what determines the former, and the two shares.
+
+    Args:
+        a, b, c: products of the dry and the viscous regressor with themselves and each other.
+        p, q: their products with the residual.
+        yy: energy of the residual.
+        healthy: the same of a healthy rig.
+    """
     if a <= 0.0 or c <= 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0
     c_ridged = c * (1.0 + RIDGE)
     left = max(a - b * b / c_ridged, 1e-9 * a)
     force = (p - b * q / c_ridged) / left
     viscous = (q - b * force) / c_ridged
-    deviations = force * np.sqrt(left) / spread
     explained = 2.0 * (force * p + viscous * q)
     explained -= force * force * a + 2.0 * force * viscous * b + viscous * viscous * c
-    beyond = max(yy - used * spread * spread, 0.2 * yy)
+    beyond = _beyond(yy, healthy)
     dry_alone = p * p / a if p > 0.0 else 0.0
-    return force, viscous, deviations, explained / beyond, dry_alone / beyond
+    return force, viscous, left, explained / beyond, dry_alone / beyond
+
+
+@part()
+def _beyond(energy: float, healthy: float) -> float:
+    """Energy of the residual beyond that of a healthy rig."""
+    return max(energy - healthy, 0.2 * energy)
 
 
 @part()
@@ -201,8 +232,65 @@ def drive_explains(kept: DecisionState, length: int, spread: float) -> float:
         a += row[DRIVEN] * row[DRIVEN]
         p += row[DRIVEN] * row[ERROR]
         yy += row[ERROR] * row[ERROR]
-    beyond = max(yy - used * spread * spread, 0.2 * yy)
-    return p * p / (a * beyond) if p > 0.0 and a > 0.0 and yy > 0.0 else 0.0
+    return _drive_share(a, p, yy, used * spread * spread)
+
+
+@part()
+def _drive_share(a: float, p: float, yy: float, healthy: float) -> float:
+    """Share of a residual beyond `healthy` that a weaker drive explains."""
+    return p * p / (a * _beyond(yy, healthy)) if p > 0.0 and a > 0.0 and yy > 0.0 else 0.0
+
+
+@part()
+def add_unrecorded(kept: DecisionState, spread: float, slow: float) -> None:
+    """Add the newest sample to the sums over a motion that was not recorded.
+
+    They forget exponentially. As in short windows, samples around reversals do not count.
+
+    Args:
+        kept: the state.
+        spread: of the healthy residual at this motion, as far as known.
+        slow: speed that cannot be distinguished from rest.
+    """
+    sums, row = kept.sums, kept.rows[(kept.counts[HEAD] - 1) % HISTORY]
+    sums[SEEN] += 1.0
+    for i in range(USED, TURNS + 1):
+        sums[i] *= 1.0 - 1.0 / UNRECORDED
+    if abs(row[SPEED]) > slow:
+        side = 1.0 if row[SPEED] > 0.0 else -1.0
+        sums[TURNS] += 1.0 if sums[SIDE] == -side else 0.0
+        sums[SIDE] = side
+    if not _slides_on(kept, 1):
+        return
+    sums[USED] += 1.0
+    sums[DRY_DRY] += row[DRY] * row[DRY]
+    sums[DRY_WET] += row[DRY] * row[WET]
+    sums[WET_WET] += row[WET] * row[WET]
+    sums[DRY_ERROR] += row[DRY] * row[ERROR]
+    sums[WET_ERROR] += row[WET] * row[ERROR]
+    sums[DRIVEN_DRIVEN] += row[DRIVEN] * row[DRIVEN]
+    sums[DRIVEN_ERROR] += row[DRIVEN] * row[ERROR]
+    sums[ENERGY] += row[ERROR] * row[ERROR]
+    sums[HEALTHY] += spread * spread
+
+
+@part()
+def unrecorded_friction(kept: DecisionState) -> tuple[float, float, float, float, float, float]:
+    """Friction over a motion that was not recorded, from its sums.
+
+    Returns:
+        Force of dry friction alone [N], the same beside viscous friction, shares of the residual
+        that both, dry friction alone and a weaker drive explain, and the residual's energy relative
+        to the healthy one; 0 until there is enough motion.
+    """
+    s = kept.sums
+    if s[SEEN] < 2.0 * UNRECORDED or s[TURNS] < FEWEST_TURNS or s[DRY_DRY] <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    beside, _, _, both, dry = _solved(
+        s[DRY_DRY], s[DRY_WET], s[WET_WET], s[DRY_ERROR], s[WET_ERROR], s[ENERGY], s[HEALTHY]
+    )
+    drive = _drive_share(s[DRIVEN_DRIVEN], s[DRIVEN_ERROR], s[ENERGY], s[HEALTHY])
+    return s[DRY_ERROR] / s[DRY_DRY], beside, both, dry, drive, s[ENERGY] / s[HEALTHY]
 
 
 @part()
