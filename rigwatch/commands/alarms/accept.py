@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from rigwatch.commands.common import print_json
+from rigwatch.commands.common import add_user, print_json
 
 HELP = "accept another device in the place of the one that daq met first"
 EXAMPLE = """  rigwatch accept rig.toml --user ann --text "converter exchanged"
@@ -15,11 +15,7 @@ TIMEOUT = 3.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("config", type=Path, metavar="CONFIG", help="configuration of the rig")
-    parser.add_argument(
-        "--user",
-        default="",
-        help="who acts; default: the operator of the certificate, or without keys the login name",
-    )
+    add_user(parser)
     parser.add_argument("--text", default="", help="reason, kept with the device")
     parser.add_argument(
         "--show", action="store_true", help="only say which device is the rig's, and which answers"

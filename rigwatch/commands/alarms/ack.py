@@ -7,6 +7,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rigwatch.commands.common import add_user
+
 if TYPE_CHECKING:
     from rigwatch.wire.bus import Bus
     from rigwatch.wire.messages import Alarm, AlarmCommand
@@ -23,11 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("config", type=Path, metavar="CONFIG", help="configuration of the rig")
     parser.add_argument("name", nargs="?", metavar="NAME", help="name of the alarm; default: all")
-    parser.add_argument(
-        "--user",
-        default="",
-        help="who acts; default: the operator of the certificate, or without keys the login name",
-    )
+    add_user(parser)
     action = parser.add_mutually_exclusive_group()
     action.add_argument(
         "--reset", action="store_true", help="reset latched alarms whose condition has gone"

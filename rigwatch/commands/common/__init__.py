@@ -3,10 +3,11 @@
 from rigwatch.commands.common.batch_options import add_many, add_on, add_where, run_many, the_one
 from rigwatch.commands.common.drawing import ready_to_draw, show_until_closed
 from rigwatch.commands.common.log_arguments import add_log_columns
-from rigwatch.commands.common.log_questions import ask_for_logs, can_ask
+from rigwatch.commands.common.log_questions import LOGS, ask_for_logs, can_ask
 from rigwatch.commands.common.many_studies import add_studies, run_studies, the_study
 from rigwatch.commands.common.marks import marks_of
 from rigwatch.commands.common.numbers import PORT, POSITIVE, number, whole
+from rigwatch.commands.common.operator_argument import add_user
 from rigwatch.commands.common.output import check_folder, print_json, print_result, say
 from rigwatch.commands.common.served_page import tell_address
 from rigwatch.commands.common.session_files import (
@@ -21,6 +22,7 @@ from rigwatch.commands.common.session_files import (
 from rigwatch.commands.common.shipped_argument import file_or_name
 
 __all__ = [
+    "LOGS",
     "PORT",
     "POSITIVE",
     "add_log_columns",
@@ -29,6 +31,7 @@ __all__ = [
     "add_session_and_target",
     "add_span",
     "add_studies",
+    "add_user",
     "add_where",
     "ask_for_logs",
     "can_ask",

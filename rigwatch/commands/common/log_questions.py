@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rigwatch.physics.engine.equations import Input, Model, Output
 
 LOGS = (".csv", ".mat", ".parquet", ".json")
-"""Suffixes of the files in the working folder that are offered as logs."""
+"""Suffixes of the files that are taken for logs where a folder is looked through."""
 
 
 def can_ask() -> bool:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigwatch.commands.common import (
+    LOGS,
     add_log_columns,
     add_many,
     file_or_name,
@@ -25,7 +26,6 @@ EXAMPLE = """\
   rigwatch import run.csv run.mcap --time 't[ms]' --map 'position=qm[mm]' --map 'force=u*35.15[N]'
   rigwatch import exported.csv run.mcap
   rigwatch import 'logs/*.csv' sessions --on local:4 --results imported.jsonl"""
-_ENDINGS = (".csv", ".mat", ".parquet", ".json")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -120,7 +120,7 @@ def _line(found: dict[str, Any]) -> str:
 
 def tables_in(folder: Path) -> list[Path]:
     """The tables in a folder, at any depth."""
-    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in _ENDINGS)
+    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in LOGS)
 
 
 def _target(folder: Path, source: Path) -> Path:

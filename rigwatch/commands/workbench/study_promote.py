@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import print_json, say
+from rigwatch.commands.common import add_user, print_json, say
 
 HELP = "promote the accepted model to the monitor of a rig, or roll back to the previous one"
 EXAMPLE = """\
@@ -18,11 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--rig", type=Path, required=True, metavar="CONFIG", help="the rig's configuration"
     )
     parser.add_argument("--rollback", action="store_true", help="roll back to the previous model")
-    parser.add_argument(
-        "--user",
-        default="",
-        help="who acts; default: the operator of the certificate, or without keys the login name",
-    )
+    add_user(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
