@@ -177,7 +177,9 @@ class Narrator:
             found = event.text.rpartition("probably missing: ")[2]
             self._say(f"            probably missing in the rig's model: {found}")
             self._say(f"            ({WHY_LATER})")
-            if event.text.startswith(ALARM):
+            newest = self.alarms[-1].name if self.alarms else ""
+            # An explanation bears the name of the first alarm, which is mostly a departure.
+            if newest == ALARM or event.text.startswith(ALARM):
                 force = self._size * self._known
                 times = f"{self._size:.2f} times the {self._known:g} N of the third recording"
                 self._say(f"            measured friction: {force:.2f} N ({times})")

@@ -198,6 +198,20 @@ def test_a_run_that_nobody_watches_ends_with_the_cause_told_or_a_while_after_the
     assert narrator.all_told_at(inf) == inf
 
 
+@pytest.mark.parametrize(("named", "told"), [("dry_friction", 1), ("other_fault", 0)])
+def test_friction_that_was_noticed_as_a_departure_is_told_with_its_size(
+    named: str, told: int
+) -> None:
+    said: list[str] = []
+    narrator = narrator_to(said)
+    narrator.alarm(alarm("departure"))
+    narrator.alarm(alarm(named))
+    narrator.judged(estimates(5200, 64, 1.02))
+    found = "departure: probably missing: coulomb@load (dry surfaces resist sliding)"
+    narrator.explain(Event("monitor", 0, "error", PROBABLY_MISSING, found))
+    assert sum("measured friction: 0.44 N" in line for line in said) == told
+
+
 def test_what_is_missing_in_the_model_is_told_and_other_events_are_not() -> None:
     said: list[str] = []
     narrator = narrator_to(said)
