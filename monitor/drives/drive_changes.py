@@ -1,4 +1,4 @@
-"""A drive's frequency, and its sudden changes, from the input alone.
+"""A drive's frequency, and sudden changes of it or of the amplitude, from the input alone.
 
     ψ(u) = u² - u₋ₘ·u₊ₘ,   2·sin(m·Ω/2) = √(⟨ψ(Δu)⟩/⟨ψ(u)⟩),   Δu = u - u₋ₘ
 
@@ -6,6 +6,8 @@ The energy operator ψ is constant for a tone, A²·sin²mΩ, so a mean over a f
 frequency Ω without ripple (P. Maragos, J. F. Kaiser, T. F. Quatieri, IEEE Trans. Signal Processing
 41, 1993). Other periodic drives have a ripple, which is compared with what it was before. The
 transient after a change is no fault, and the motion's own spectrum shows a change too late to tell.
+A drive without a ripple is also followed with a shorter memory, which sees its change while the
+motion has hardly begun to differ.
 """
 
 from typing import NamedTuple
@@ -17,13 +19,11 @@ from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes, fill, push
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kernel import kernel
 
-APART = 4
-"""m [samples]: more is less sensitive to noise, and limits Ω to π/2m."""
-MEAN, SLOW = 24.0, 128.0
-"""Memory of the frequency, and of what it was before [samples]."""
-LEAST, RIPPLE, BROAD = 0.08, 1.5, 0.35
-"""Change of the frequency's logarithm that is a change of the drive, at least and relative to the
-usual one; and the usual one above which the drive has no frequency.
+SLOW = 128.0
+"""Memory of what the frequency was before [samples]."""
+LEAST, BROAD = 0.08, 0.35
+"""Least change of the frequency's logarithm that is a change of the drive, and the usual change
+above which the drive has no frequency.
 """
 SECTION = 256.0
 """Samples over which the usual change is the largest; the last two complete ones count."""
@@ -35,6 +35,24 @@ LARGEST, SQUARED, BENT, WAS, SEEN, NEWEST, LAST, BEFORE = range(8)
 """Carried figures: the largest mean of ψ(u), means of ψ(u) and of ψ(Δu), the logarithm of the
 frequency before, the number of samples with a drive, and largest changes of three sections.
 """
+
+
+class Memory(NamedTuple):
+    """How a frequency is followed.
+
+    Attributes:
+        apart: m [samples]: more is less sensitive to noise, and limits Ω to π/2m.
+        mean: memory of the frequency [samples].
+        ripple: ratio to the usual change above which it is a change of the drive; a short memory
+            leaves noise, whose largest values vary.
+    """
+
+    apart: int
+    mean: float
+    ripple: float
+
+
+LONG, SHORT = Memory(4, 24.0, 1.5), Memory(2, 4.0, 2.5)
 
 
 class Drive(NamedTuple):
@@ -54,13 +72,26 @@ class DriveChanges:
     """Follows one input, block by block."""
 
     def __init__(self) -> None:
-        self._last = np.zeros(3 * APART + 1)
-        self._kept = np.zeros(8)
+        self._long, self._short = _Followed(LONG), _Followed(SHORT)
 
     def update(self, signal: FloatArray, code: Codes) -> Drive:
         """The drive at each sample of a signal of shape (n,)."""
+        slow, fast = (each.update(signal, code) for each in (self._long, self._short))
+        return Drive(slow.changed | fast.changed, slow.pace)
+
+
+class _Followed:
+    """An input followed with one memory."""
+
+    def __init__(self, memory: Memory) -> None:
+        self._memory = memory
+        self._last = np.zeros(3 * memory.apart + 1)
+        self._kept = np.zeros(8)
+
+    def update(self, signal: FloatArray, code: Codes) -> Drive:
         found = Drive(np.zeros(code.size, np.bool_), np.zeros(code.size))
-        _advance(np.ascontiguousarray(signal), code, self._last, self._kept, *found)
+        carried = self._last, self._kept
+        _advance(np.ascontiguousarray(signal), code, *self._memory, *carried, *found)
         return found
 
 
@@ -68,6 +99,9 @@ class DriveChanges:
 def _advance(  # noqa: PLR0917 -- a kernel
     signal: FloatArray,
     code: Codes,
+    apart: int,
+    mean: float,
+    ripple: float,
     last: FloatArray,
     kept: FloatArray,
     changed: NDArray[np.bool_],
@@ -80,12 +114,12 @@ def _advance(  # noqa: PLR0917 -- a kernel
         if code[k] == DEAD:
             continue
         push(last, signal[k])
-        a, b, c, e = last[0], last[APART], last[2 * APART], last[3 * APART]
+        a, b, c, e = last[0], last[apart], last[2 * apart], last[3 * apart]
         squared = c * c - b * e
         first, middle, second = b - a, c - b, e - c
         bent = middle * middle - first * second
-        kept[SQUARED] += (squared - kept[SQUARED]) / MEAN
-        kept[BENT] += (bent - kept[BENT]) / MEAN
+        kept[SQUARED] += (squared - kept[SQUARED]) / mean
+        kept[BENT] += (bent - kept[BENT]) / mean
         kept[LARGEST] = max(KEEPS * kept[LARGEST], kept[SQUARED])
         if kept[SQUARED] <= STILL * kept[LARGEST] or kept[BENT] <= 0.0:
             kept[SEEN] = 0.0
@@ -98,6 +132,6 @@ def _advance(  # noqa: PLR0917 -- a kernel
             kept[BEFORE], kept[LAST], kept[NEWEST] = kept[LAST], kept[NEWEST], 0.0
         change, usual = abs(now - kept[WAS]), max(kept[LAST], kept[BEFORE])
         kept[NEWEST] = max(kept[NEWEST], change)
-        changed[k] = change > max(LEAST, RIPPLE * usual) and usual < BROAD
+        changed[k] = change > max(LEAST, ripple * usual) and usual < BROAD
         kept[WAS] += (now - kept[WAS]) / (1.0 if changed[k] else SLOW)
         pace[k] = np.exp(kept[WAS])

@@ -31,6 +31,11 @@ energies of the residual and of a healthy one, reversals, and the direction of t
 """
 UNRECORDED, FEWEST_TURNS = 256, 4.0
 """Memory of these sums [samples], and reversals in it from which on they tell friction."""
+ALIKE = 0.82
+"""Squared cosine between the responses to dry and viscous friction above which a motion does not
+tell them apart: about 2/π under Gaussian noise, and at least 8/π² under a tone, where any small
+error of the equations decides how much looks dry.
+"""
 HEAD, FILLED, WAS_JUDGING, LASTED = 0, 1, 12, 13
 """Indices of `decision_state.Counts` as constants for the kernel."""
 BURST = 3.0
@@ -281,10 +286,11 @@ def unrecorded_friction(kept: DecisionState) -> tuple[float, float, float, float
     Returns:
         Force of dry friction alone [N], the same beside viscous friction, shares of the residual
         that both, dry friction alone and a weaker drive explain, and the residual's energy relative
-        to the healthy one; 0 until there is enough motion.
+        to the healthy one; 0 until there is enough motion, at speeds that vary.
     """
     s = kept.sums
-    if s[SEEN] < 2.0 * UNRECORDED or s[TURNS] < FEWEST_TURNS or s[DRY_DRY] <= 0.0:
+    alike = s[DRY_WET] ** 2 > ALIKE * s[DRY_DRY] * s[WET_WET]
+    if s[SEEN] < 2.0 * UNRECORDED or s[TURNS] < FEWEST_TURNS or s[DRY_DRY] <= 0.0 or alike:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     beside, _, _, both, dry = _solved(
         s[DRY_DRY], s[DRY_WET], s[WET_WET], s[DRY_ERROR], s[WET_ERROR], s[ENERGY], s[HEALTHY]

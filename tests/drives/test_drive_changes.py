@@ -43,6 +43,20 @@ def test_another_frequency_is_a_change(factor: float, noise: float) -> None:
     assert CHANGE <= changed[0] < CHANGE + 48
 
 
+@pytest.mark.parametrize("factor", [0.8, 1.25])
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+@pytest.mark.parametrize("what", ["frequency", "amplitude"])
+def test_a_change_of_a_tone_is_seen_before_the_motion_differs(
+    what: str, factor: float, noise: float
+) -> None:
+    ratio = np.where(AT < CHANGE, 1.0, factor)
+    signal = tone(8.0 * ratio) if what == "frequency" else ratio * tone(8.0)
+
+    changed = np.flatnonzero(followed(signal + noise * RNG.standard_normal(N)).changed)
+
+    assert CHANGE <= changed[0] < CHANGE + 6
+
+
 @pytest.mark.parametrize(
     "signal",
     [

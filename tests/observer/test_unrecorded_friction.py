@@ -98,3 +98,11 @@ def test_a_motion_that_hardly_reverses_shows_no_friction() -> None:
     out = watched(-FORCE * np.sign(speed), speed, np.zeros(N))
 
     assert (out[d.VERDICT] == d.UNNAMED).all()
+
+
+def test_a_tone_does_not_tell_dry_friction_from_what_grows_with_the_motion() -> None:
+    speed = np.sin(2.0 * np.pi * 5.0 * (np.arange(N) + 0.3) / RATE)
+
+    out = watched(-FORCE * np.sign(speed), speed, np.zeros(N))
+
+    assert (out[d.VERDICT] == d.UNNAMED).all()
