@@ -112,12 +112,14 @@ class ShortHorizons:
         begin = self.compiled.parameters if self.start is None else self.start
         growing = growing_horizons(self.horizon)
         balanced, closer = self._balanced(begin)
-        driven = self._driven(begin)
+        driven, nearer = self._driven(begin)
         given = ("the given values", begin, growing if self.horizon >= LONG else [])
-        if driven is not None:
+        if nearer and driven is not None:
             yield "the measured motion", driven, []
         if not closer:
             yield given
+        if driven is not None and not nearer:
+            yield "the measured motion", driven, []
         if balanced is not None:
             yield "the balance of the equations", balanced, []
             if closer:
@@ -202,14 +204,21 @@ class ShortHorizons:
             return None, False
         return starts[least], errors[least] < self._short_error(begin)
 
-    def _driven(self, begin: FloatArray) -> FloatArray | None:
-        """A start along the measured motion, None if it is no better than the given values."""
+    def _driven(self, begin: FloatArray) -> tuple[FloatArray | None, bool]:
+        """The start along the measured motion.
+
+        Returns:
+            The start, None if there is none; and whether it is better over a short horizon than the
+            given values. A force that a sensor does not show, as a constant one, may be far off
+            there and is soon found.
+        """
         noise = self.scale if self.noise is None else self.noise
         if noise is None:
-            return None
+            return None, False
         found = motion_start(self.compiled, self.recording, begin, noise, self.substeps)
-        closer = found is not None and self._short_error(found) < self._short_error(begin)
-        return found if closer else None
+        if found is None:
+            return None, False
+        return found, self._short_error(found) < self._short_error(begin)
 
     def _short_error(self, parameters: FloatArray) -> float:
         """Scaled error over the second shortest of the growing horizons."""
