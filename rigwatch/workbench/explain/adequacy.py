@@ -48,6 +48,7 @@ JUDGED_ON = (
     ' rigwatch study base {study} --take "{names}"'
 )
 CHANGE = "the healthy machine has {label} already: what is missing is more of it"
+BEYOND = "it acts on what has passed the {element} that the healthy machine has"
 
 
 def inadequate(bench: Bench) -> Verdict | None:
@@ -231,12 +232,14 @@ def _on_found_base(study: Study, enough: float, progress: Progress) -> Bench | N
 
 
 def with_change_told(study: Study, found: Verdict) -> Verdict:
-    """The verdict, which says so if it names an element that the base has already."""
+    """The verdict, which says so if it names an element of the base, or what acts beyond one."""
     labels = {element.label for element in elements_of(study.file.variants)}
     named = sorted(labels & {*found.members})
-    if not named:
-        return found
-    return replace(found, text=f"{found.text}; {CHANGE.format(label=named[0])}")
+    told = [CHANGE.format(label=named[0])] if named else []
+    fitted = found.best.fitted if found.best is not None else None
+    if fitted is not None and fitted.placements[-1].beyond:
+        told.append(BEYOND.format(element=fitted.placements[-1].beyond))
+    return replace(found, text="; ".join([found.text, *told]))
 
 
 def _may_search(bench: Bench) -> bool:

@@ -65,10 +65,14 @@ def placements_of(study: Study, recording: Recording) -> tuple[Placement, ...]:
     sizes = port_sizes(study.model, recording)
     return tuple(
         Placement(
-            a.effect, study.effect_at(a.effect, a.port).scaled(sizes[a.port]), a.port, a.ahead
+            a.effect,
+            study.effect_at(a.effect, a.port).scaled(sizes[a.port]),
+            a.port,
+            a.ahead,
+            a.beyond,
         )
         if a.port in sizes
-        else Placement(a.effect, study.effect(a.effect), a.port, a.ahead)
+        else Placement(a.effect, study.effect(a.effect), a.port, a.ahead, a.beyond)
         for a in study.file.effects
     )
 

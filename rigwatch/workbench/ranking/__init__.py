@@ -31,12 +31,12 @@ from rigwatch.workbench.ranking.refitting import (
     Progress,
     fit_started,
     no_progress,
-    orders_at_port,
     own_floor,
     refit,
 )
 from rigwatch.workbench.ranking.same_drive import denied_sensors
 from rigwatch.workbench.ranking.scoring import rank_all, rank_only, score_all, scored
+from rigwatch.workbench.ranking.series_order import Order, order_of, orders_at_port
 
 __all__ = [
     "AGAIN",
@@ -48,6 +48,7 @@ __all__ = [
     "SIMILAR",
     "STEP",
     "Fitting",
+    "Order",
     "Progress",
     "Ranked",
     "accepted_from",
@@ -60,6 +61,7 @@ __all__ = [
     "judge_fit",
     "left_over",
     "no_progress",
+    "order_of",
     "orders_at_port",
     "own_floor",
     "promises_more",

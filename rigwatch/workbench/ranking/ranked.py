@@ -130,8 +130,11 @@ def accepted_from(row: Ranked) -> Accepted:
         for name, value in row.fitted.train.values().items()
         if name.startswith(prefix)
     }
-    ahead = row.fitted.placements[-1].ahead
-    return Accepted(effect=row.effect, port=row.port, parameters=values, ahead=ahead)
+    placed = row.fitted.placements[-1]
+    return Accepted(
+        effect=row.effect, port=row.port, parameters=values, ahead=placed.ahead,
+        beyond=placed.beyond,
+    )  # fmt: skip
 
 
 def in_order(rows: Sequence[Ranked]) -> list[Ranked]:

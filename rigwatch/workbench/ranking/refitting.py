@@ -17,6 +17,7 @@ from rigwatch.workbench.fit import (
 )
 from rigwatch.workbench.ranking.acceptance import EXPLAINED, judge_fit, leaves_nothing
 from rigwatch.workbench.ranking.ranked import SIMILAR, Ranked
+from rigwatch.workbench.ranking.series_order import orders_at_port
 from rigwatch.workbench.study import Study
 
 Progress = Callable[[str], None]
@@ -38,7 +39,7 @@ def refit(
         fitting: `fit_model` accepts the first minimum, `fit_with_retry` also searches elsewhere.
     """
     start, fits, failures = base.train.values() | row.begin(), list[Fitted](), list[str]()
-    for placement in orders_at_port(base, row):
+    for placement in orders_at_port(study, base, row):
         placements = (*base.placements, placement)
         try:
             fits.append(fitting(study, data, placements, start, base.train.scale, base=base))
@@ -70,17 +71,6 @@ def fit_from(found: Fitted | None) -> Fitting:
     """`fit_model` that starts from the model's parameters in another fit."""
     own = found.train.values() if found else {}
     return fit_started(lambda study, _: {n: own[n] for n in study.model.parameters if n in own})
-
-
-def orders_at_port(base: Fitted, row: Ranked) -> list[Placement]:
-    """The effect placed after those at its port and, where order matters, before them.
-
-    A drive that is delayed and then saturates differs from one that saturates first.
-    """
-    others = any(placement.port == row.port for placement in base.placements)
-    if row.kind == "force" or not others:
-        return [row.placement]
-    return [row.placement, replace(row.placement, ahead=True)]
 
 
 def refit_all(

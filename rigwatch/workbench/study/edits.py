@@ -22,6 +22,7 @@ def append_effect(study: Study, accepted: Accepted) -> Study:
     written = converted(study, accepted, "from_si")
     table = f'effect = "{accepted.effect}"\nport = "{accepted.port}"\n'
     table += "ahead = true\n" if accepted.ahead else ""
+    table += f'beyond = "{accepted.beyond}"\n' if accepted.beyond else ""
     table += f"parameters = {_inline(written.parameters)}\n"
     if written.model:
         table += f"model = {_inline(written.model)}\n"

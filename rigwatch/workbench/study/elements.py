@@ -6,8 +6,9 @@ written among the study's variants as `effect@port`, with initial values in SI i
     variants = ["closed_spool", "valve_hysteresis@drive(b=0.05)"]
 
 and becomes part of the model's equations; its parameters are fitted to the healthy recordings and
-kept. An effect that is ranked at the same port acts beside it (forces) or before it (actuators), so
-that more of what is there already is named as what it is.
+kept. An effect that is ranked at the same port acts beside it (forces), before it (actuators) or
+after it (sensors), so that more of what is there already is named as what it is. At an actuator an
+inner port lies on the element's far side, where an effect is tried as well (`Placement.beyond`).
 """
 
 import re
@@ -25,6 +26,7 @@ from rigwatch.physics.engine.equations import (
     Placement,
     Quantity,
     State,
+    beyond_port,
     renamed,
     units_at,
 )
@@ -105,11 +107,15 @@ def with_element(model: Model, placement: Placement) -> Model:
     else:
         name, unit = prefix + "here", units_at(model, placement.port)
         own |= {"u": placement.port}
-        after = name if port.kind == "actuator" else f"({placement.port} + {name})"
+        inner = beyond_port(placement.port, placement.name)
+        after = inner if port.kind == "actuator" else f"({placement.port} + {name})"
         model = _passed(model, {placement.port: after})
         text = renamed(effect.expression, own)
         here = Quantity(expression=text, unit=unit["u" if port.kind == "actuator" else "F"])
         model = structs.replace(model, quantities=model.quantities | {name: here})
+        if port.kind == "actuator":
+            far = structs.replace(port, kind="inner", signal=name)
+            model = structs.replace(model, ports=model.ports | {inner: far})
     return structs.replace(
         model,
         parameters=model.parameters | parameters,

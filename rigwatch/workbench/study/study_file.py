@@ -61,6 +61,9 @@ class Accepted(Section, frozen=True, kw_only=True):
         bool,
         Meta(description="whether a signal passes it before the effects that are listed earlier"),
     ] = False
+    beyond: Annotated[
+        str, Meta(description="element of the base that a signal passes first, see `variants`")
+    ] = ""
 
 
 class StudyFile(Section, frozen=True, kw_only=True):

@@ -83,6 +83,7 @@ def _parsed(text: str, names: tuple[tuple[str, sympy.Expr], ...], where: str) ->
     return value
 
 
+@lru_cache(maxsize=1024)
 def check_size(text: str, where: str) -> None:
     """Check that an expression is not too long or too deeply nested.
 

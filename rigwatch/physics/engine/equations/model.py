@@ -177,7 +177,13 @@ class Variable(Quantity, frozen=True, kw_only=True):
 class Port(Section, frozen=True, kw_only=True):
     """A place where effects may enter."""
 
-    kind: Annotated[Literal["force", "actuator", "sensor"], Meta(description="how it enters")]
+    kind: Annotated[
+        Literal["force", "actuator", "sensor", "inner"],
+        Meta(
+            description="how it enters; `inner`: where a signal has passed an element of the"
+            " model, entered by effects of the port named before `_beyond_` only"
+        ),
+    ]
     unit: Annotated[str, Meta(description="unit of what effects add or change here")] = ""
     signal: Annotated[
         str, Meta(description="input or quantity of an actuator port, output of a sensor port")

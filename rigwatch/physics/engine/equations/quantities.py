@@ -20,6 +20,9 @@ from rigwatch.physics.engine.equations.model import Hold, Input, Model, Output, 
 from rigwatch.physics.engine.equations.syntax_tree import LONGEST
 from rigwatch.wire.errors import ModelError
 
+INWARD = ("actuator", "inner")
+"""Kinds of ports that an input or a quantity passes on its way into the equations."""
+
 
 def in_order(model: Model) -> tuple[str, ...]:
     """Names of the quantities in order of dependence.
@@ -67,7 +70,7 @@ def spelt_out(model: Model) -> Model:
         )
         for name, port in model.ports.items()
     }
-    signals = {port.signal for port in ports.values() if port.kind == "actuator"}
+    signals = {port.signal for port in ports.values() if port.kind in INWARD}
     quantities = {
         n: replace(q, expression=texts[n][1:-1])
         for n, q in model.quantities.items()
@@ -78,7 +81,7 @@ def spelt_out(model: Model) -> Model:
 
 def signals_at(model: Model, port: Port) -> dict[str, Input | Quantity | Output]:
     """What may be the signal of an actuator or sensor port, by name."""
-    return {**model.inputs, **model.quantities} if port.kind == "actuator" else {**model.outputs}
+    return {**model.inputs, **model.quantities} if port.kind in INWARD else {**model.outputs}
 
 
 def arriving(model: Model, port: Port) -> str:
@@ -93,7 +96,7 @@ def names_reached(model: Model, text: str, where: str) -> frozenset[str]:
     while found - reached:
         ports = [model.ports[name] for name in found - reached if name in model.ports]
         reached = found
-        texts = [arriving(model, port) for port in ports if port.kind == "actuator"]
+        texts = [arriving(model, port) for port in ports if port.kind in INWARD]
         found = found.union(*(names_in(each, where) for each in texts))
     return found
 

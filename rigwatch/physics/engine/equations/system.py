@@ -38,12 +38,20 @@ class Placement:
     Attributes:
         name, effect, port: the effect and its port.
         ahead: at a signal port, apply it before the effects placed there earlier.
+        beyond: at a signal port, the element of the model on whose far side it acts, see
+            `beyond_port`; beside the port if empty.
     """
 
     name: str
     effect: Effect
     port: str
     ahead: bool = False
+    beyond: str = ""
+
+    @property
+    def entry(self) -> str:
+        """Name of the port where it enters the equations."""
+        return beyond_port(self.port, self.beyond) if self.beyond else self.port
 
     @property
     def prefix(self) -> str:
@@ -87,11 +95,27 @@ class System:
         return tuple(name for name, p in self.parameters.items() if not p.fixed)
 
 
+def beyond_port(port: str, element: str) -> str:
+    """Name of the inner port on the far side of an element that a model has at a signal port.
+
+    A signal passes the element between both: what clips before a lag differs from what clips
+    after it.
+    """
+    return f"{port}_beyond_{element}"
+
+
+def elements_at(model: Model, port: str) -> list[str]:
+    """The elements at a signal port on whose far side an effect may act, by name."""
+    first = beyond_port(port, "")
+    inner = (name for name, own in model.ports.items() if own.kind == "inner")
+    return [name.removeprefix(first) for name in inner if name.startswith(first)]
+
+
 def signal_order(placements: Sequence[Placement], port: str) -> list[Placement]:
-    """The effects at a port in the order in which its signal passes them."""
+    """The effects that enter at a port in the order in which its signal passes them."""
     found: list[Placement] = []
     for placement in placements:
-        if placement.port == port:
+        if placement.entry == port:
             found.insert(0 if placement.ahead else len(found), placement)
     return found
 
@@ -114,6 +138,12 @@ def _check_port(model: Model, placement: Placement) -> None:
         known = ", ".join(model.ports) or "a model with ports"
         raise ModelError(
             f"effect {placement.name}: found port {placement.port!r}, expected one of {known}"
+        )
+    if placement.entry not in model.ports:
+        known = ", ".join(elements_at(model, placement.port)) or "none"
+        raise ModelError(
+            f"effect {placement.name}: found beyond = {placement.beyond!r}, expected an element of"
+            f" the base at {placement.port}: {known}"
         )
     if not placement.effect.fits(port.kind):
         raise ModelError(
@@ -145,7 +175,7 @@ class _Composer:
 
     def system(self) -> System:
         self._join(self._known())
-        ports = self._entered("actuator", "force")
+        ports = self._entered("actuator", "inner", "force")
         self._join(self._waiting)
         model_rates = {
             name: self._scope.read(state.derivative, f"({state.unit})/s", f"state {name}")
@@ -260,7 +290,7 @@ class _Composer:
         """The effect's own scope; its parameters and states are added to the system."""
         scope = Scope()
         scope.define(TIME, symbol(TIME), "s")
-        for name, meaning in self._variables[placement.port].items():
+        for name, meaning in self._variables[placement.entry].items():
             scope.define(name, meaning, port.variables[name].unit)
         if port.kind != "force":
             scope.define("u", arriving, unit)

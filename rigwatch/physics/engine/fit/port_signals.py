@@ -35,7 +35,7 @@ def port_signals(  # noqa: PLR0917 -- they belong together
         dt: time between samples [s].
         values: parameters by name.
     """
-    port = system.model.ports[placement.port]
+    port = system.model.ports[placement.entry]
     known: Signals = {TIME: dt * np.arange(len(inputs), dtype=np.float64)}
     known |= dict(zip(system.states, states.T, strict=True))
     known |= dict(zip(system.model.inputs, inputs.T, strict=True))

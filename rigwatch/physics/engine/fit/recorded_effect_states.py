@@ -94,9 +94,9 @@ def _own(placement: Placement, values: Mapping[str, float]) -> dict[str, float]:
 
 def _before(system: System, placement: Placement) -> list[Placement]:
     """Effects that a signal passes before this one; none at a force port, where effects add."""
-    if system.model.ports[placement.port].kind == "force":
+    if system.model.ports[placement.entry].kind == "force":
         return []
-    order = signal_order(system.placements, placement.port)
+    order = signal_order(system.placements, placement.entry)
     return order[: order.index(placement)]
 
 
@@ -132,7 +132,7 @@ class RecordedEffectStates:
         self._placed = []
         for placement in (each for each in system.placements if each.effect.states):
             signals = port_signals(system, placement, inputs, states, dt, values)
-            port = system.model.ports[placement.port]
+            port = system.model.ports[placement.entry]
             apart = _divided(placement, parts)
             own = [
                 EffectStates(
@@ -150,7 +150,7 @@ class RecordedEffectStates:
         driven = [
             c
             for placed in self._placed
-            if placed.placement.port in known and not placed.after_effect_with_states
+            if placed.placement.entry in known and not placed.after_effect_with_states
             for c in placed.columns
         ]
         self.exact = sorted({*driven, *self.counted})

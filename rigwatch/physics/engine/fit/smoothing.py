@@ -15,7 +15,7 @@ from math import factorial
 import numpy as np
 import scipy
 
-from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.arrays import ComplexArray, FloatArray
 
 POLYNOMIAL = 3
 """Order of the polynomial."""
@@ -69,7 +69,7 @@ def best_width(signal: FloatArray, order: int) -> int:
     ideal = frequency**order
     errors = []
     for width in allowed:
-        response = _response(width, order, frequency)
+        response = _amplitude(_transformed(_kernel(width, order), len(signal)), order)
         errors.append(float(np.sum((response - ideal) ** 2 * above + response**2 * noise)))
     return allowed[int(np.argmin(errors))]
 
@@ -90,7 +90,21 @@ def _quietest(power: FloatArray) -> float:
 
 def _response(width: int, order: int, frequency: FloatArray) -> FloatArray:
     """Amplitude response of the kernel without its phase of order·90°; in samples."""
-    kernel = scipy.signal.savgol_coeffs(width, POLYNOMIAL, deriv=order, use="dot")
     at = np.arange(width) - width // 2
-    turned = np.exp(1j * np.outer(frequency, at)) @ kernel
-    return np.asarray((turned / 1j**order).real, np.float64)
+    return _amplitude(np.exp(1j * np.outer(frequency, at)) @ _kernel(width, order), order)
+
+
+def _kernel(width: int, order: int) -> FloatArray:
+    """Weights of the samples about an instant, shape (width,)."""
+    return np.asarray(scipy.signal.savgol_coeffs(width, POLYNOMIAL, deriv=order, use="dot"))
+
+
+def _transformed(kernel: FloatArray, samples: int) -> ComplexArray:
+    """A kernel's response at the frequencies of `rfft` of so many samples."""
+    about = np.zeros(samples)
+    np.add.at(about, (np.arange(len(kernel)) - len(kernel) // 2) % samples, kernel)
+    return np.conj(np.fft.rfft(about))
+
+
+def _amplitude(response: ComplexArray, order: int) -> FloatArray:
+    return np.asarray((response / 1j**order).real, np.float64)

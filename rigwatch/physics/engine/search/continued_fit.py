@@ -44,6 +44,11 @@ MOST = 30
 """Most evaluations of a fit."""
 
 
+# Results are checked for being finite; NumPy's warnings are redundant.
+_QUIET = np.errstate(over="ignore", invalid="ignore")
+
+
+@_QUIET
 def fit_continued(
     compiled: CompiledSystem,
     recording: Recording,
@@ -73,6 +78,7 @@ def fit_continued(
     return windows.fitted(prior) if windows.continue_anywhere else found
 
 
+@_QUIET
 def continued_error_at(
     found: Fit, recording: Recording, horizon: int, substeps: int, parameters: FloatArray
 ) -> float:

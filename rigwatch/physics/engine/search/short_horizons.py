@@ -4,8 +4,9 @@ Over a long horizon the simulation error has spurious minima: a mass of tons tha
 spring too stiff to respond. A fit is therefore started from several points:
 
 1. the given values;
-2. values that balance the equations along the measured motion, if channels measure all states;
-3. either of these over horizons that grow from a few samples to the full one, each the start of the
+2. values that balance the equations along the measured motion, if channels measure all states; if
+   they measure some, values with which these drive the others best;
+3. any of these over horizons that grow from a few samples to the full one, each the start of the
    next (the error over a short horizon has few minima);
 4. values drawn over the bounds, also over growing horizons.
 
@@ -28,6 +29,7 @@ from rigwatch.physics.engine.search.drawn_starts import drawn_start
 from rigwatch.physics.engine.search.equation_error import equation_error_starts
 from rigwatch.physics.engine.search.hidden_states import continued_spread, has_hidden_states
 from rigwatch.physics.engine.search.horizons import growing_horizons, longer_horizons
+from rigwatch.physics.engine.search.motion_start import motion_start
 from rigwatch.physics.engine.search.multi_start_fit import Attempt, agreeing
 from rigwatch.physics.engine.search.promised_step import kept_promise
 from rigwatch.wire.arrays import FloatArray
@@ -110,9 +112,14 @@ class ShortHorizons:
         begin = self.compiled.parameters if self.start is None else self.start
         growing = growing_horizons(self.horizon)
         balanced, closer = self._balanced(begin)
+        driven, nearer = self._driven(begin)
         given = ("the given values", begin, growing if self.horizon >= LONG else [])
+        if nearer and driven is not None:
+            yield "the measured motion", driven, []
         if not closer:
             yield given
+        if driven is not None and not nearer:
+            yield "the measured motion", driven, []
         if balanced is not None:
             yield "the balance of the equations", balanced, []
             if closer:
@@ -196,6 +203,22 @@ class ShortHorizons:
         if not np.isfinite(errors[least]):
             return None, False
         return starts[least], errors[least] < self._short_error(begin)
+
+    def _driven(self, begin: FloatArray) -> tuple[FloatArray | None, bool]:
+        """The start along the measured motion.
+
+        Returns:
+            The start, None if there is none; and whether it is better over a short horizon than the
+            given values. A force that a sensor does not show, as a constant one, may be far off
+            there and is soon found.
+        """
+        noise = self.scale if self.noise is None else self.noise
+        if noise is None:
+            return None, False
+        found = motion_start(self.compiled, self.recording, begin, noise, self.substeps)
+        if found is None:
+            return None, False
+        return found, self._short_error(found) < self._short_error(begin)
 
     def _short_error(self, parameters: FloatArray) -> float:
         """Scaled error over the second shortest of the growing horizons."""

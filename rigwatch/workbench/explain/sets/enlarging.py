@@ -22,6 +22,7 @@ from rigwatch.workbench.ranking import (
     Ranked,
     candidates,
     fit_started,
+    order_of,
     refit,
     scored,
 )
@@ -109,7 +110,7 @@ def _enlarged(bench: Bench, larger: Larger) -> Combination | None:
     """A set with another effect; None if it cannot be fitted."""
     known, row = larger.known, larger.row
     starts = larger.trial.starts if larger.trial else {}
-    fitting = fit_started(lambda _, placements: starts.get(placements[-1].ahead, {}))
+    fitting = fit_started(lambda _, placements: starts.get(order_of(placements[-1]), {}))
     fit_with(bench, known.rows, known.fitted, row, fitting)
     return None if row.fitted is None else combination_of(bench, (*known.rows, row))
 

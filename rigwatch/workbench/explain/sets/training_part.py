@@ -17,7 +17,7 @@ from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit import Fitted, continued_train_error, trained
-from rigwatch.workbench.ranking import Ranked, orders_at_port
+from rigwatch.workbench.ranking import Order, Ranked, order_of, orders_at_port
 from rigwatch.workbench.study import Study
 
 ENOUGH = 1500
@@ -65,7 +65,7 @@ class Trial:
     """
 
     error: float
-    starts: dict[bool, dict[str, float]]
+    starts: dict[Order, dict[str, float]]
 
 
 def part_of(bench: Bench) -> TrainingPart | None:
@@ -85,16 +85,16 @@ def tried(study: Study, part: TrainingPart, base: Fitted, row: Ranked) -> Trial 
         row: the effect.
     """
     base = part.of(base)
-    begin, found = base.train.values() | row.begin(), dict[bool, Fitted]()
-    for placement in orders_at_port(base, row):
+    begin, found = base.train.values() | row.begin(), dict[Order, Fitted]()
+    for placement in orders_at_port(study, base, row):
         try:
-            found[placement.ahead] = trained(study, part.data, placement, begin, base)
+            found[order_of(placement)] = trained(study, part.data, placement, begin, base)
         except ModelError:
             continue
     errors = [error for each in found.values() if (error := _continued(each, part)) is not None]
     if not errors:
         return None
-    return Trial(min(errors), {ahead: each.train.values() for ahead, each in found.items()})
+    return Trial(min(errors), {order: each.train.values() for order, each in found.items()})
 
 
 def _continued(fitted: Fitted, part: TrainingPart) -> float | None:
