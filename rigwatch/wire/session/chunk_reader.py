@@ -1,7 +1,7 @@
 """Records of an MCAP chunk, cut into the messages of the table of topics."""
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from io import BytesIO
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from rigwatch.wire.session.writer import FORMAT, FORMAT_KEY
 _RECORD = struct.Struct("<BQ")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
 _SCHEMA, _CHANNEL, _MESSAGE = 0x03, 0x04, 0x05
+_MALFORMED = (struct.error, McapError, ValueError, RecursionError)
 _BY_NUMBER = dict(enumerate(TOPICS, start=1))
 _BY_NAMES = {(line.name, schema.type_name(line.message)): line for line in TOPICS}
 
@@ -60,8 +61,24 @@ class ChunkReader:
         """
         try:
             yield from self._cut(records, wanted)
-        except (struct.error, McapError, ValueError, RecursionError) as error:
-            raise SessionError(f"{self._path}: a malformed record: {error}") from None
+        except _MALFORMED as error:
+            raise self._malformed(error) from None
+
+    def declared(self, declarations: Iterable[tuple[int, bytes]]) -> dict[int, Topic | None]:
+        """The topic of each channel, once these schema and channel records are read.
+
+        Raises:
+            SessionError: a record is malformed, or has a later version.
+        """
+        try:
+            for opcode, body in declarations:
+                self._declare(opcode, body)
+        except _MALFORMED as error:
+            raise self._malformed(error) from None
+        return dict(self._lines)
+
+    def _malformed(self, error: Exception) -> SessionError:
+        return SessionError(f"{self._path}: a malformed record: {error}")
 
     def _cut(self, records: bytes, wanted: Topic | None) -> Iterator[tuple[Topic, int, bytes]]:
         at, end = 0, len(records)
@@ -80,12 +97,9 @@ class ChunkReader:
                     yield line, t_ns, records[begin : at + length] if kept else b""
                 else:
                     self._left -= length
-            elif opcode == _SCHEMA:
+            elif opcode in (_SCHEMA, _CHANNEL):
                 self._left -= length + DECLARATION_COST
-                self._schemas |= _read_schema(records[at : at + length])
-            elif opcode == _CHANNEL:
-                self._left -= length + DECLARATION_COST
-                self._declare(records[at : at + length])
+                self._declare(opcode, records[at : at + length])
             else:
                 self._left -= length
                 self._pass_over()
@@ -100,7 +114,13 @@ class ChunkReader:
     def _line(self, number: int) -> Topic | None:
         return self._lines[number] if number in self._lines else _BY_NUMBER.get(number)
 
-    def _declare(self, body: bytes) -> None:
+    def _declare(self, opcode: int, body: bytes) -> None:
+        if opcode == _SCHEMA:
+            self._schemas |= _read_schema(body)
+        else:
+            self._declare_channel(body)
+
+    def _declare_channel(self, body: bytes) -> None:
         channel = Channel.read(ReadDataStream(BytesIO(body)))
         line = _BY_NAMES.get((channel.topic, self._schemas.get(channel.schema_id, "")))
         self._lines[channel.id] = line
