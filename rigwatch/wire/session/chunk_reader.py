@@ -2,6 +2,7 @@
 
 import struct
 from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
 
@@ -25,6 +26,8 @@ MOST_OTHERS = 10_000
 """Records of a file's chunks that are neither messages nor declarations."""
 BASE, RATIO = 1 << 30, 200
 """Bytes that any file may unpack to beside the data of rigwatch, and the same per byte of it."""
+SHORT = 1 << 12
+"""Longest declaration that is remembered [bytes]; those of rigwatch are shorter."""
 RECORD_COST, DECLARATION_COST = 512, 1 << 14
 """Bytes that take the time of a record without content, and of a declaration."""
 
@@ -115,13 +118,13 @@ class ChunkReader:
         return self._lines[number] if number in self._lines else _BY_NUMBER.get(number)
 
     def _declare(self, opcode: int, body: bytes) -> None:
-        if opcode == _SCHEMA:
-            self._schemas |= _read_schema(body)
+        found = declaration(opcode, body)
+        if isinstance(found, Schema):
+            self._schemas[found.id] = found.name
         else:
-            self._declare_channel(body)
+            self._declare_channel(found)
 
-    def _declare_channel(self, body: bytes) -> None:
-        channel = Channel.read(ReadDataStream(BytesIO(body)))
+    def _declare_channel(self, channel: Channel) -> None:
         line = _BY_NAMES.get((channel.topic, self._schemas.get(channel.schema_id, "")))
         self._lines[channel.id] = line
         if line is None:
@@ -141,6 +144,22 @@ def _size(path: Path) -> int:
         raise SessionError(f"{path}: cannot be read: {reason_of(error)}") from error
 
 
-def _read_schema(body: bytes) -> dict[int, str]:
-    found = Schema.read(ReadDataStream(BytesIO(body)))
-    return {found.id: found.name}
+def declaration(opcode: int, body: bytes) -> Schema | Channel:
+    """The schema or channel in a record's body.
+
+    Raises:
+        ValueError, EOFError, McapError, struct.error: it is malformed.
+    """
+    return (_remembered if len(body) <= SHORT else _read)(opcode, body)
+
+
+@lru_cache(maxsize=64)
+def _remembered(opcode: int, body: bytes) -> Schema | Channel:
+    """The same, remembered, as all files of a version declare the same."""
+    return _read(opcode, body)
+
+
+def _read(opcode: int, body: bytes) -> Schema | Channel:
+    kind: type[Schema | Channel] = Schema if opcode == _SCHEMA else Channel
+    found: Schema | Channel = kind.read(ReadDataStream(BytesIO(body)))
+    return found

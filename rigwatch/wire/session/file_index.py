@@ -15,16 +15,16 @@ import struct
 import zlib
 from collections.abc import Iterator, Set
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.records import Channel
 from numpy.typing import NDArray
 
 from rigwatch.wire.arrays import IntArray
+from rigwatch.wire.session.chunk_reader import declaration
 from rigwatch.wire.session.chunks import LARGEST_RECORD, MAGIC, RECORD
 
 _FOOTER = struct.Struct("<BQQQI")
@@ -34,6 +34,7 @@ _U32 = struct.Struct("<I")
 _HEAD = np.dtype([("times", "V16"), ("begin", "<u8"), ("size", "<u8"), ("width", "<u4")])
 """The head of a chunk index."""
 _SIZE, _NUMBER = np.dtype("<u8"), np.dtype("<u2")
+_UNREADABLE = (OSError, struct.error, McapError, ValueError, IndexError)
 Places = NDArray[np.intp]
 _HEADER_KIND, _FOOTER_KIND, _SCHEMA, _CHANNEL = 0x01, 0x02, 0x03, 0x04
 _CHUNK_INDEX, _STATISTICS, _DATA_END_KIND = 0x08, 0x0B, 0x0F
@@ -74,7 +75,7 @@ def topic_counts(path: Path) -> dict[str, int] | None:
     try:
         summary, _ = _summary(path)
         return _counts(summary)
-    except (OSError, struct.error, EOFError, UnicodeDecodeError, ValueError):
+    except _UNREADABLE:
         return None
 
 
@@ -83,7 +84,7 @@ def file_index(path: Path) -> FileIndex | None:
     try:
         summary, start = _summary(path)
         return _file_index(path, summary, start)
-    except (OSError, struct.error, EOFError, ValueError, IndexError):
+    except _UNREADABLE:
         return None
 
 
@@ -124,8 +125,9 @@ def _counts(summary: bytes) -> dict[str, int] | None:
     counts: dict[int, int] | None = None
     for kind, begin, end in _records(summary):
         if kind == _CHANNEL:
-            channel = Channel.read(ReadDataStream(BytesIO(summary[begin:end])))
-            topics[channel.id] = channel.topic
+            channel = declaration(kind, summary[begin:end])
+            if isinstance(channel, Channel):
+                topics[channel.id] = channel.topic
         elif kind == _STATISTICS:
             counts = dict(_COUNT.iter_unpack(summary[begin + _COUNTS_AT + 4 : end]))
         if counts is not None and counts.keys() <= topics.keys():

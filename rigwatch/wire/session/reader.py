@@ -126,9 +126,11 @@ class Session:
         Raises:
             SessionError: no segment has one.
         """
-        for recorded in self.messages(["run"]):
-            if isinstance(recorded.message, RunInfo):
-                return recorded.message
+        # It comes first: a look at the index would cost more than the search.
+        for index in range(len(self.segments)):
+            for line, _, data in self._scanned(index):
+                if line.message is RunInfo:
+                    return cast(RunInfo, self._decode(line, data))
         raise SessionError(f"{self.path}: the description of the run (RunInfo) is lost")
 
     def may_hold(self, name: str) -> bool:
@@ -266,10 +268,10 @@ class Session:
         reader = ChunkReader(self.segments[index], set())
         lines = reader.declared(known.declarations)
         others = {number for number, line in lines.items() if line not in wanted}
-        listed = False
+        only, listed = _only(wanted), False
         for item in selected_chunks(self.segments[index], known, others):
             if isinstance(item, Chunk):
-                yield from reader.messages(item.records, _only(wanted))
+                yield from reader.messages(item.records, only)
             elif not listed:
                 listed = True
                 for _ in self._scanned(index):
