@@ -1,15 +1,16 @@
 """Chooses the model and the alarm settings for the replay of a session."""
 
+from functools import lru_cache
 from pathlib import Path
 
 from monitor.detectors import FRICTION, detectors_of
-from monitor.model import load_model
+from monitor.model import RigModel, parse_model
 from monitor.pipeline import RigMonitor
 from rigwatch.replay.run import check_suits
 from rigwatch.wire.errors import ConfigError, SessionError
 from rigwatch.wire.rig_config import MonitorSection, RigConfig, load_rig
 from rigwatch.wire.session import Session
-from rigwatch.wire.typed_files import parse
+from rigwatch.wire.typed_files import parse, read_text
 
 
 def monitor_for(session: Session, model: Path | None, config: Path | None) -> RigMonitor:
@@ -28,13 +29,19 @@ def monitor_for(session: Session, model: Path | None, config: Path | None) -> Ri
     path = model or (Path(section.model) if section else None)
     if path is None:
         raise SessionError(f"{session.path}: found no model in its configuration, expected --model")
-    loaded = load_model(path)
+    loaded = _parsed(read_text(path), str(path))
     check_suits(session, loaded)
     if section is None:
         return RigMonitor(loaded)
     detectors = detectors_of(section.detectors, loaded, file)
     watches_friction = FRICTION in section.detectors
     return RigMonitor(loaded, section.alarms, detectors, file, watches_friction)
+
+
+@lru_cache(maxsize=4)
+def _parsed(text: str, name: str) -> RigModel:
+    """The model in a file's text; remembered, as thousands of recordings are judged by one."""
+    return parse_model(text, name)
 
 
 def _section(session: Session, config: Path | None) -> tuple[MonitorSection | None, str]:

@@ -12,6 +12,7 @@ from rigwatch.wire.session.edit import (
     standing_alarms,
     trim,
 )
+from rigwatch.wire.session.file_index import topic_counts
 from rigwatch.wire.session.losses import Span, without
 from rigwatch.wire.session.merging import LARGEST_BLOCK, merge_pending
 from rigwatch.wire.session.reader import (
@@ -23,7 +24,6 @@ from rigwatch.wire.session.reader import (
 )
 from rigwatch.wire.session.segment import SUFFIX, is_segment, segment_name
 from rigwatch.wire.session.span import Part, Place, Wanted, read_page
-from rigwatch.wire.session.statistics import topic_counts
 from rigwatch.wire.session.summary import ChannelSummary, DeviceSummary, Summary, summarise
 from rigwatch.wire.session.writer import SessionWriter, message_time, run_info
 

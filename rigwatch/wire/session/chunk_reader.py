@@ -1,7 +1,8 @@
 """Records of an MCAP chunk, cut into the messages of the table of topics."""
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from rigwatch.wire.session.writer import FORMAT, FORMAT_KEY
 _RECORD = struct.Struct("<BQ")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
 _SCHEMA, _CHANNEL, _MESSAGE = 0x03, 0x04, 0x05
+_MALFORMED = (struct.error, McapError, ValueError, RecursionError)
 _BY_NUMBER = dict(enumerate(TOPICS, start=1))
 _BY_NAMES = {(line.name, schema.type_name(line.message)): line for line in TOPICS}
 
@@ -24,6 +26,8 @@ MOST_OTHERS = 10_000
 """Records of a file's chunks that are neither messages nor declarations."""
 BASE, RATIO = 1 << 30, 200
 """Bytes that any file may unpack to beside the data of rigwatch, and the same per byte of it."""
+SHORT = 1 << 12
+"""Longest declaration that is remembered [bytes]; those of rigwatch are shorter."""
 RECORD_COST, DECLARATION_COST = 512, 1 << 14
 """Bytes that take the time of a record without content, and of a declaration."""
 
@@ -60,8 +64,24 @@ class ChunkReader:
         """
         try:
             yield from self._cut(records, wanted)
-        except (struct.error, McapError, ValueError, RecursionError) as error:
-            raise SessionError(f"{self._path}: a malformed record: {error}") from None
+        except _MALFORMED as error:
+            raise self._malformed(error) from None
+
+    def declared(self, declarations: Iterable[tuple[int, bytes]]) -> dict[int, Topic | None]:
+        """The topic of each channel, once these schema and channel records are read.
+
+        Raises:
+            SessionError: a record is malformed, or has a later version.
+        """
+        try:
+            for opcode, body in declarations:
+                self._declare(opcode, body)
+        except _MALFORMED as error:
+            raise self._malformed(error) from None
+        return dict(self._lines)
+
+    def _malformed(self, error: Exception) -> SessionError:
+        return SessionError(f"{self._path}: a malformed record: {error}")
 
     def _cut(self, records: bytes, wanted: Topic | None) -> Iterator[tuple[Topic, int, bytes]]:
         at, end = 0, len(records)
@@ -80,12 +100,9 @@ class ChunkReader:
                     yield line, t_ns, records[begin : at + length] if kept else b""
                 else:
                     self._left -= length
-            elif opcode == _SCHEMA:
+            elif opcode in (_SCHEMA, _CHANNEL):
                 self._left -= length + DECLARATION_COST
-                self._schemas |= _read_schema(records[at : at + length])
-            elif opcode == _CHANNEL:
-                self._left -= length + DECLARATION_COST
-                self._declare(records[at : at + length])
+                self._declare(opcode, records[at : at + length])
             else:
                 self._left -= length
                 self._pass_over()
@@ -100,8 +117,14 @@ class ChunkReader:
     def _line(self, number: int) -> Topic | None:
         return self._lines[number] if number in self._lines else _BY_NUMBER.get(number)
 
-    def _declare(self, body: bytes) -> None:
-        channel = Channel.read(ReadDataStream(BytesIO(body)))
+    def _declare(self, opcode: int, body: bytes) -> None:
+        found = declaration(opcode, body)
+        if isinstance(found, Schema):
+            self._schemas[found.id] = found.name
+        else:
+            self._declare_channel(found)
+
+    def _declare_channel(self, channel: Channel) -> None:
         line = _BY_NAMES.get((channel.topic, self._schemas.get(channel.schema_id, "")))
         self._lines[channel.id] = line
         if line is None:
@@ -121,6 +144,22 @@ def _size(path: Path) -> int:
         raise SessionError(f"{path}: cannot be read: {reason_of(error)}") from error
 
 
-def _read_schema(body: bytes) -> dict[int, str]:
-    found = Schema.read(ReadDataStream(BytesIO(body)))
-    return {found.id: found.name}
+def declaration(opcode: int, body: bytes) -> Schema | Channel:
+    """The schema or channel in a record's body.
+
+    Raises:
+        ValueError, EOFError, McapError, struct.error: it is malformed.
+    """
+    return (_remembered if len(body) <= SHORT else _read)(opcode, body)
+
+
+@lru_cache(maxsize=64)
+def _remembered(opcode: int, body: bytes) -> Schema | Channel:
+    """The same, remembered, as all files of a version declare the same."""
+    return _read(opcode, body)
+
+
+def _read(opcode: int, body: bytes) -> Schema | Channel:
+    kind: type[Schema | Channel] = Schema if opcode == _SCHEMA else Channel
+    found: Schema | Channel = kind.read(ReadDataStream(BytesIO(body)))
+    return found

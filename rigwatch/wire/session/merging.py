@@ -33,6 +33,21 @@ def merge_pending(messages: Iterable[Message], largest: int = LARGEST_BLOCK) -> 
     return [joined for slot in slots for joined in _joined(slot)]
 
 
+def by_chunk(messages: list[Message]) -> list[list[Message]]:
+    """The messages of a flush by the chunks they are written to.
+
+    Samples stand apart from estimates, which are three times as many bytes, so that who reads only
+    samples need not unpack the estimates. Where a command stands between them, all stay together
+    and keep their order.
+    """
+    samples: list[Message] = [item for item in messages if isinstance(item, SampleBlock)]
+    rest: list[Message] = [item for item in messages if not isinstance(item, SampleBlock)]
+    mixed = samples and any(isinstance(item, EstimateBlock) for item in rest)
+    if not mixed or any(isinstance(item, AlarmCommand) for item in rest):
+        return [messages]
+    return [samples, rest]
+
+
 def _append_block(
     slots: list[list[Message]],
     runs: dict[tuple[type[Message], str], tuple[list[Message], int]],

@@ -1,7 +1,7 @@
 """Index of the chunks of a file being written, kept as the bytes that will stand at its end.
 
 The MCAP writer keeps an object for each chunk until the file is closed, 640 bytes of memory; a
-recorder writes two chunks a second and rig. As bytes it is a sixth.
+recorder writes up to five chunks a second and rig. As bytes it is a sixth.
 """
 
 from collections.abc import Iterator

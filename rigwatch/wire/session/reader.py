@@ -30,12 +30,14 @@ from rigwatch.wire.messages import (
     topic,
 )
 from rigwatch.wire.session.chunk_reader import ChunkReader
-from rigwatch.wire.session.chunks import Damage, ends_closed, scan
+from rigwatch.wire.session.chunks import Chunk, Damage, ends_closed, scan
+from rigwatch.wire.session.file_index import FileIndex, file_index, topic_counts
 from rigwatch.wire.session.joined_blocks import joined_blocks
 from rigwatch.wire.session.segment import SUFFIX
-from rigwatch.wire.session.statistics import topic_counts
+from rigwatch.wire.session.selected_chunks import selected_chunks
 from rigwatch.wire.session.writer import message_time
 
+_Found = tuple[Topic, int, bytes]
 MERGED_SAMPLES = 16384
 """Samples in an uninterrupted block of `Session.samples`."""
 
@@ -105,6 +107,7 @@ class Session:
     def __init__(self, path: Path, segments: tuple[Path, ...]) -> None:
         self.path, self.segments = path, segments
         self._lost: dict[tuple[int, int], LostSpan] = {}
+        self._index: tuple[int, FileIndex] | None = None
 
     @property
     def lost(self) -> tuple[LostSpan, ...]:
@@ -123,9 +126,11 @@ class Session:
         Raises:
             SessionError: no segment has one.
         """
-        for recorded in self.messages(["run"]):
-            if isinstance(recorded.message, RunInfo):
-                return recorded.message
+        # It comes first: a look at the index would cost more than the search.
+        for index in range(len(self.segments)):
+            for line, _, data in self._scanned(index):
+                if line.message is RunInfo:
+                    return cast(RunInfo, self._decode(line, data))
         raise SessionError(f"{self.path}: the description of the run (RunInfo) is lost")
 
     def may_hold(self, name: str) -> bool:
@@ -133,8 +138,11 @@ class Session:
 
         It needs no pass through the session.
         """
-        counted = [topic_counts(path) for path in self.segments]
-        return any(counts is None or counts.get(name, 0) > 0 for counts in counted)
+        return any(counts is None or counts.get(name, 0) > 0 for counts in self._counted)
+
+    @cached_property
+    def _counted(self) -> tuple[dict[str, int] | None, ...]:
+        return tuple(topic_counts(path) for path in self.segments)
 
     def check_content(self) -> None:
         """Raise if the session holds no message of rigwatch."""
@@ -162,10 +170,10 @@ class Session:
         Raises:
             SessionError: a segment cannot be opened, or the topic is unknown.
         """
-        wanted = set(TOPICS) if topics is None else {_topic(name) for name in topics}
+        wanted = None if topics is None else frozenset(map(_topic, topics))
         for index in range(len(self.segments)):
-            for line, t_ns, data in self._records(index):
-                if line not in wanted:
+            for line, t_ns, data in self._records(index, wanted=wanted):
+                if wanted is not None and line not in wanted:
                     continue
                 message = _within(self._decode(line, data), start, end)
                 if message is not None:
@@ -227,20 +235,57 @@ class Session:
         """All blocks of one topic, joined up to `size` samples."""
         try:
             for index in range(len(self.segments)):
-                found = self._records(index, wanted=line)
+                found = self._records(index, wanted=frozenset([line]))
                 payloads = (data for topic, _, data in found if topic is line)
                 yield from joined_blocks(line.message, payloads, size)  # type: ignore[type-var]
         except MessageError as error:
             raise SessionError(f"{self.path}: {error}") from error
 
     def _records(
-        self, index: int, foreign: set[str] | None = None, wanted: Topic | None = None
-    ) -> Iterator[tuple[Topic, int, bytes]]:
-        """Topic, time and bytes of every message of one segment; records damage.
+        self,
+        index: int,
+        foreign: set[str] | None = None,
+        wanted: frozenset[Topic] | None = None,
+    ) -> Iterator[_Found]:
+        """Topic, time and bytes of messages of one segment; records damage.
 
-        There are no bytes of other topics than `wanted`, if it is given.
+        They are all of the topics that are `wanted`, and maybe others, whose bytes may be missing.
         """
+        known = None if wanted is None else self._index_of(index)
+        if wanted is None or known is None:
+            return self._scanned(index, foreign, wanted)
+        return self._selected(index, known, wanted)
+
+    def _index_of(self, index: int) -> FileIndex | None:
+        """The index of a closed segment; of the last one asked for, it is remembered."""
+        if self._index is None or self._index[0] != index:
+            found = file_index(self.segments[index])
+            self._index = None if found is None else (index, found)
+        return None if self._index is None else self._index[1]
+
+    def _selected(self, index: int, known: FileIndex, wanted: frozenset[Topic]) -> Iterator[_Found]:
+        """The same without the chunks that hold other topics alone."""
+        reader = ChunkReader(self.segments[index], set())
+        lines = reader.declared(known.declarations)
+        others = {number for number, line in lines.items() if line not in wanted}
+        only, listed = _only(wanted), False
+        for item in selected_chunks(self.segments[index], known, others):
+            if isinstance(item, Chunk):
+                yield from reader.messages(item.records, only)
+            elif not listed:
+                listed = True
+                for _ in self._scanned(index):
+                    pass
+
+    def _scanned(
+        self,
+        index: int,
+        foreign: set[str] | None = None,
+        wanted: frozenset[Topic] | None = None,
+    ) -> Iterator[_Found]:
+        """Topic, time and bytes of every message of one segment; records damage."""
         reader = ChunkReader(self.segments[index], set() if foreign is None else foreign)
+        only = _only(wanted)
         damage: list[Damage] = []
         last: int | None = None
         try:
@@ -248,7 +293,7 @@ class Session:
                 if isinstance(item, Damage):
                     damage.append(item)
                     continue
-                for line, t_ns, data in reader.messages(item.records, wanted):
+                for line, t_ns, data in reader.messages(item.records, only):
                     if damage:
                         self._note(index, damage, last, t_ns)
                         damage = []
@@ -280,6 +325,11 @@ class Session:
             )
             if (index, item.offset) not in self._lost or before is not None:
                 self._lost[index, item.offset] = span
+
+
+def _only(wanted: frozenset[Topic] | None) -> Topic | None:
+    """The wanted topic, None for several or all."""
+    return next(iter(wanted)) if wanted is not None and len(wanted) == 1 else None
 
 
 def _topic(name: str) -> Topic:

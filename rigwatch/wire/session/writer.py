@@ -1,9 +1,11 @@
-"""Writes one MCAP file: every flush is one checksummed chunk, synced to the disk.
+"""Writes one MCAP file: every flush is one or two checksummed chunks, synced to the disk.
 
     magic, header
     chunk  schemas, channels, RunInfo
-    chunk  everything between two flushes: samples and estimates each merged into one block
+    chunk  samples between two flushes, merged into one block
+    chunk  estimates, merged into one block, and everything else between these flushes
     …
+    end    checksum of everything before it
     summary, magic                          only if the file was closed; a killed one ends with its
                                             last chunk
 
@@ -30,7 +32,7 @@ from rigwatch.wire.messages import (
 )
 from rigwatch.wire.messages import protobuf_schema as schema
 from rigwatch.wire.session.file_output import FileOutput
-from rigwatch.wire.session.merging import LARGEST_BLOCK, merge_pending
+from rigwatch.wire.session.merging import LARGEST_BLOCK, by_chunk, merge_pending
 from rigwatch.wire.session.packed_index import PackedIndex
 
 PROFILE = "rigwatch"
@@ -54,8 +56,8 @@ def message_time(message: Message) -> int:
 class SessionWriter:
     """One session file being written.
 
-    `write` buffers; `flush` merges the buffered messages, writes them as one chunk and waits for
-    the disk. After a failed flush the file is unchanged, `pending` holds the unwritten messages,
+    `write` buffers; `flush` merges the buffered messages, writes them at once and waits for the
+    disk. After a failed flush the file is unchanged, `pending` holds the unwritten messages,
     and the writer is closed.
 
     Args:
@@ -72,7 +74,12 @@ class SessionWriter:
         self.pending: list[Message] = []
         self._waiting = 0
         self._output = FileOutput(self.path, sync)
-        self._mcap = Writer(self._output, _NEVER, CompressionType.ZSTD)  # type: ignore[arg-type]
+        self._mcap = Writer(
+            self._output,  # type: ignore[arg-type]
+            _NEVER,
+            CompressionType.ZSTD,
+            enable_data_crcs=True,
+        )
         PackedIndex.put_into(self._mcap)
         try:
             self._head(run)
@@ -112,9 +119,10 @@ class SessionWriter:
         """
         if not self.pending and not self._output.waiting:
             return
-        for message in merge_pending(self.pending):
-            self._add(message)
-        self._mcap.flush()  # type: ignore[no-untyped-call]
+        for chunk in by_chunk(merge_pending(self.pending)):
+            for message in chunk:
+                self._add(message)
+            self._mcap.flush()  # type: ignore[no-untyped-call]
         self._output.commit()
         self.pending.clear()
         self._waiting = 0
