@@ -115,7 +115,8 @@ def _told(name: str) -> tuple[str, ...]:
 def run(quick: bool) -> list[Row]:
     """Eight sessions, or as many as RIGWATCH_YEAR_SESSIONS says (default 1000, about an hour).
 
-    After RIGWATCH_YEAR_MINUTES it ends with those that it has run.
+    After RIGWATCH_YEAR_MINUTES it ends with those that it has run. RIGWATCH_YEAR_FOLDER, which must
+    not exist, is where the rig's files are kept, with each process's memory after each session.
     """
     count = 8 if quick else int(os.environ.get("RIGWATCH_YEAR_SESSIONS", str(SESSIONS)))
     until = time.monotonic() + 60.0 * float(os.environ.get("RIGWATCH_YEAR_MINUTES", "inf"))
@@ -136,6 +137,7 @@ def run(quick: bool) -> list[Row]:
             rows = _rows(done, f"a year, {ran}{count} sessions", limit)
         if kept := os.environ.get("RIGWATCH_YEAR_FOLDER"):
             shutil.copytree(rig.folder, kept, ignore=shutil.ignore_patterns("serial-line"))
+            done.memory.write(Path(kept, "memory.csv"))
     return rows
 
 
@@ -186,13 +188,15 @@ def _memory_row(what: str, done: Year, name: str) -> Row:
     growth, at_end, looks = done.memory.growth(name)
     late, _, late_looks = done.memory.growth(name, 0.25)
     year_percent = growth * len(done.memory.seen[name]) / max(1, looks)
+    steps = done.memory.steps(name)
+    when = ", ".join(f"{kb / 1e3:.1f} MB at {look}" for look, kb in steps[-4:])
     return Row(
         f"{what}: memory of {name}",
         f"{year_percent:+.2f} % a year",
         f"{MEMORY_PERCENT:g} %",
         "",
         f"{growth:+.2f} % over {looks} sessions, {late:+.2f} % over the last {late_looks}, "
-        f"{at_end:.1f} MB at the end",
+        f"{at_end:.1f} MB at the end; {len(steps)} steps" + (f", the last {when}" if when else ""),
         passed=year_percent <= MEMORY_PERCENT,
     )
 
