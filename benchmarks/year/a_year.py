@@ -22,9 +22,9 @@ from benchmarks.processes.live_rig import LiveRig, live_rig
 from benchmarks.year import account
 from benchmarks.year.account import Reason, journal_of_years
 from benchmarks.year.calendar import AT_S, FOR_S, RUNNING_S, SESSIONS, Session, year
-from benchmarks.year.resources import Memory, folder_bytes
 from benchmarks.year.rig_of_the_year import PROCESSES, RigOfTheYear
 from tools.benchmark_table import Row
+from tools.memory_series import Memory
 
 RATE = 8.0
 SESSION_BYTES, PART, SMALLEST = 6e5, 5.0, 2e6
@@ -103,9 +103,20 @@ class Year:
 
     def _look(self, session: Session) -> None:
         self.memory.look({name: self.rig.pid(name) for name in PROCESSES})
-        self.largest = max(self.largest, folder_bytes(self.rig.rig.folder / "sessions"))
+        self.largest = max(self.largest, _folder_bytes(self.rig.rig.folder / "sessions"))
         if session.index % 10 == 0:
             print(f"session {session.index}: {self.largest / 1e6:.1f} MB", file=sys.stderr)
+
+
+def _folder_bytes(folder: Path) -> int:
+    """Size of all files in a folder [bytes]."""
+    total = 0
+    for path in folder.rglob("*"):
+        try:
+            total += path.stat().st_size if path.is_file() else 0
+        except OSError:
+            continue  # removed meanwhile
+    return total
 
 
 def _told(name: str) -> tuple[str, ...]:

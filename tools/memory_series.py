@@ -1,4 +1,4 @@
-"""Memory of processes and size of a folder over a year."""
+"""Memory of processes over a long run: how fast it grows, and when it steps."""
 
 import csv
 from collections.abc import Iterable, Mapping
@@ -16,17 +16,6 @@ def memory_kb(pid: int) -> float:
         return float("nan")
     found = [line.split()[1] for line in lines if line.startswith("RssAnon")]
     return float(found[0]) if found else float("nan")
-
-
-def folder_bytes(folder: Path) -> int:
-    """Size of all files in a folder [bytes]."""
-    total = 0
-    for path in folder.rglob("*"):
-        try:
-            total += path.stat().st_size if path.is_file() else 0
-        except OSError:
-            continue  # removed meanwhile
-    return total
 
 
 STEP_KB, BESIDE = 400.0, 5

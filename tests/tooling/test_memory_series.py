@@ -1,8 +1,8 @@
-"""The series of memory that a year's run keeps, and the steps that it finds in it."""
+"""The series of memory that a long run keeps, and the steps that are found in it."""
 
 from pathlib import Path
 
-from benchmarks.year.resources import Memory
+from tools.memory_series import Memory
 
 BEFORE, AT, RISE = 30_000.0, 60, 1_024.0
 
