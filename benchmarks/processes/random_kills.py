@@ -178,7 +178,7 @@ def _operate(rig: LiveRig, stop: threading.Event, done: Disturbance) -> None:
                 bus = connect(rig.config, "operator-desk", 3.0)
                 try:
                     command = AlarmCommand("*", action, "benchmark", time.time_ns())
-                    done.refused += bool(command_alarms(bus, command)[1])
+                    done.refused += bool(command_alarms(bus, command).refusal)
                     done.commands += 1
                 finally:
                     bus.close()

@@ -22,9 +22,9 @@ from benchmarks.processes.live_rig import LiveRig, live_rig
 from benchmarks.year import account
 from benchmarks.year.account import Reason, journal_of_years
 from benchmarks.year.calendar import AT_S, FOR_S, RUNNING_S, SESSIONS, Session, year
-from benchmarks.year.resources import Memory, folder_bytes
 from benchmarks.year.rig_of_the_year import PROCESSES, RigOfTheYear
 from tools.benchmark_table import Row
+from tools.memory_series import Memory
 
 RATE = 8.0
 SESSION_BYTES, PART, SMALLEST = 6e5, 5.0, 2e6
@@ -103,9 +103,20 @@ class Year:
 
     def _look(self, session: Session) -> None:
         self.memory.look({name: self.rig.pid(name) for name in PROCESSES})
-        self.largest = max(self.largest, folder_bytes(self.rig.rig.folder / "sessions"))
+        self.largest = max(self.largest, _folder_bytes(self.rig.rig.folder / "sessions"))
         if session.index % 10 == 0:
             print(f"session {session.index}: {self.largest / 1e6:.1f} MB", file=sys.stderr)
+
+
+def _folder_bytes(folder: Path) -> int:
+    """Size of all files in a folder [bytes]."""
+    total = 0
+    for path in folder.rglob("*"):
+        try:
+            total += path.stat().st_size if path.is_file() else 0
+        except OSError:
+            continue  # removed meanwhile
+    return total
 
 
 def _told(name: str) -> tuple[str, ...]:
@@ -115,7 +126,8 @@ def _told(name: str) -> tuple[str, ...]:
 def run(quick: bool) -> list[Row]:
     """Eight sessions, or as many as RIGWATCH_YEAR_SESSIONS says (default 1000, about an hour).
 
-    After RIGWATCH_YEAR_MINUTES it ends with those that it has run.
+    After RIGWATCH_YEAR_MINUTES it ends with those that it has run. RIGWATCH_YEAR_FOLDER, which must
+    not exist, is where the rig's files are kept, with each process's memory after each session.
     """
     count = 8 if quick else int(os.environ.get("RIGWATCH_YEAR_SESSIONS", str(SESSIONS)))
     until = time.monotonic() + 60.0 * float(os.environ.get("RIGWATCH_YEAR_MINUTES", "inf"))
@@ -136,6 +148,7 @@ def run(quick: bool) -> list[Row]:
             rows = _rows(done, f"a year, {ran}{count} sessions", limit)
         if kept := os.environ.get("RIGWATCH_YEAR_FOLDER"):
             shutil.copytree(rig.folder, kept, ignore=shutil.ignore_patterns("serial-line"))
+            done.memory.write(Path(kept, "memory.csv"))
     return rows
 
 
@@ -186,13 +199,15 @@ def _memory_row(what: str, done: Year, name: str) -> Row:
     growth, at_end, looks = done.memory.growth(name)
     late, _, late_looks = done.memory.growth(name, 0.25)
     year_percent = growth * len(done.memory.seen[name]) / max(1, looks)
+    steps = done.memory.steps(name)
+    when = ", ".join(f"{kb / 1e3:.1f} MB at {look}" for look, kb in steps[-4:])
     return Row(
         f"{what}: memory of {name}",
         f"{year_percent:+.2f} % a year",
         f"{MEMORY_PERCENT:g} %",
         "",
         f"{growth:+.2f} % over {looks} sessions, {late:+.2f} % over the last {late_looks}, "
-        f"{at_end:.1f} MB at the end",
+        f"{at_end:.1f} MB at the end; {len(steps)} steps" + (f", the last {when}" if when else ""),
         passed=year_percent <= MEMORY_PERCENT,
     )
 

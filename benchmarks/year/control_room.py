@@ -33,7 +33,7 @@ def obey(bus: Bus) -> None:
         action: Action = "reset" if line.strip() == "reset" else "acknowledge"
         try:
             command = AlarmCommand("*", action, "control-room", time.time_ns())
-            refused = command_alarms(bus, command)[1]
+            refused = command_alarms(bus, command).refusal
         except RigwatchError as error:
             say("answer", text=str(error))
         else:

@@ -18,6 +18,7 @@ those that require stopping the rig are always shown. A chattering alarm is one 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
+from monitor.alarms.actor import NOBODY, Actor
 from monitor.alarms.debounce import Debouncer
 from monitor.alarms.flood import MOST_IN_WINDOW, FloodWatch
 from monitor.alarms.kinds import (
@@ -28,7 +29,7 @@ from monitor.alarms.kinds import (
     order_of,
     settings_of,
 )
-from monitor.alarms.operator import NOBODY, Actor, addressed, refusal
+from monitor.alarms.operator import addressed, refusal
 from monitor.alarms.record import AlarmRecord
 from monitor.alarms.restoring import let_go, restore_from
 from monitor.alarms.state import UNSEEN, AlarmInstance, Occasion
@@ -174,6 +175,14 @@ class AlarmManager:
         """Every alarm that is not normal, first-out first, then in order of time."""
         alarms = [alarm.message() for alarm in self._alarms.values() if alarm.state != "normal"]
         return sorted(alarms, key=lambda alarm: (not alarm.first_out, alarm.t_ns))
+
+    def shelved(self) -> list[AlarmRecord]:
+        """Every alarm that an operator has put aside, by whom, until when and why."""
+        return [
+            _record(alarm, None, alarm.shelved_by)
+            for alarm in self._alarms.values()
+            if alarm.shelved_until_ns
+        ]
 
     def take_changes(self) -> list[AlarmRecord]:
         """Records for the journal since the last call, in order."""
@@ -431,7 +440,9 @@ class AlarmManager:
                 self._publish(alarm, t_ns, actor)
 
     def _shelve(self, alarm: AlarmInstance, t_ns: int, actor: Actor) -> None:
-        alarm.shelved_until_ns = t_ns + SHELF_LIFE_NS
+        alarm.shelved_until_ns, alarm.shelved_by = t_ns + SHELF_LIFE_NS, actor
+        # Otherwise it would be raised from the shelf once no better name stands.
+        alarm.superseded = False
         alarm.dismiss()
         self._publish(alarm, t_ns, actor)
         hours = SHELF_LIFE_NS // 3_600_000_000_000
@@ -456,12 +467,7 @@ class AlarmManager:
 
     def _note(self, alarm: AlarmInstance, t_ns: int, actor: Actor = NOBODY) -> None:
         """Add a record for the journal."""
-        self._changes.append(
-            AlarmRecord(
-                alarm.message(actor.user, t_ns, actor.identity), alarm.active, alarm.latched,
-                alarm.shelved_until_ns, alarm.grouped, actor.text,
-            )
-        )  # fmt: skip
+        self._changes.append(_record(alarm, t_ns, actor))
 
     def _tell(self, code: str, text: str, t_ns: int) -> None:
         self._said.append(Event(SOURCE, t_ns, "warning", code, text))
@@ -469,3 +475,10 @@ class AlarmManager:
     def _take_announcements(self) -> list[Announcement]:
         said, self._said = self._said, []
         return said
+
+
+def _record(alarm: AlarmInstance, t_ns: int | None, actor: Actor) -> AlarmRecord:
+    return AlarmRecord(
+        alarm.message(actor.user, t_ns, actor.identity), alarm.active, alarm.latched,
+        alarm.shelved_until_ns, alarm.grouped, actor.text,
+    )  # fmt: skip

@@ -1,32 +1,14 @@
 """Operator commands: the alarms that they address, and reasons for refusing them."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from monitor.alarms.kinds import split
 from monitor.alarms.state import UNSEEN, AlarmInstance
-from rigwatch.wire.messages import EVERY_ALARM, LONGEST_NAME, LONGEST_TEXT, AlarmCommand, Identity
+from rigwatch.wire.messages import EVERY_ALARM, LONGEST_NAME, LONGEST_TEXT, AlarmCommand
 
 MAX_CLOCK_DIFFERENCE_NS = 60_000_000_000
 """Largest difference between a command's time and the monitor's; beyond it, it is wrong [ns]."""
-
-
-@dataclass(frozen=True, slots=True)
-class Actor:
-    """Who or what caused a transition.
-
-    Attributes:
-        user: the operator, "" if nobody acted.
-        identity: whether the operator is proved by a signature.
-        text: the operator's remark, or the reason of the transition.
-    """
-
-    user: str = ""
-    identity: Identity = ""
-    text: str = ""
-
-
-NOBODY = Actor()
 
 
 def bounded(command: AlarmCommand, now_ns: int) -> AlarmCommand:

@@ -4,6 +4,7 @@ A flood and a series of comings are counted in memory: both end with the run. So
 the configuration disables now.
 """
 
+from monitor.alarms.actor import Actor
 from monitor.alarms.kinds import ALARM_FLOOD, REFINED
 from monitor.alarms.record import AlarmRecord
 from monitor.alarms.state import AlarmInstance, Occasion
@@ -14,6 +15,8 @@ def restore_from(alarm: AlarmInstance, record: AlarmRecord) -> None:
     said = record.alarm
     alarm.state, alarm.latched = said.state, record.latched
     alarm.shelved_until_ns, alarm.first_out = record.shelved_until_ns, said.first_out
+    if alarm.shelved_until_ns:
+        alarm.shelved_by = Actor(said.user, said.identity, record.text)
     hidden = record.active and said.state == "normal" and not record.shelved_until_ns
     alarm.superseded = hidden and alarm.settings.enabled and alarm.kind.name in REFINED
     # An alarm that was disabled is raised anew if its condition holds.

@@ -20,6 +20,7 @@ normal regardless of its condition, for a limited time.
 
 from dataclasses import dataclass, field
 
+from monitor.alarms.actor import NOBODY, Actor
 from monitor.alarms.flapping import FlapWatch
 from monitor.alarms.kinds import REFINED, AlarmKind, AlarmSettings, kind_of, split
 from rigwatch.wire.messages import Alarm, AlarmState, Identity
@@ -60,6 +61,7 @@ class AlarmInstance:
         active: whether the condition holds, after persistence and hysteresis.
         latched: an operator must still reset it.
         shelved_until_ns: end of shelving [ns]; 0 if not shelved.
+        shelved_by: who shelved it, and the remark.
         superseded: an alarm that refines it has replaced it in this episode.
         first_out: it was raised while no other alarm was unacknowledged.
         grouped: it is hidden in a flood.
@@ -74,6 +76,7 @@ class AlarmInstance:
     active: bool = False
     latched: bool = False
     shelved_until_ns: int = 0
+    shelved_by: Actor = NOBODY
     superseded: bool = False
     first_out: bool = False
     grouped: bool = False

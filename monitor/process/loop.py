@@ -27,12 +27,19 @@ from monitor.process.link_watch import (
     occasion,
 )
 from monitor.process.model_requests import ModelDesk, Place
-from monitor.process.operator_desk import OperatorDesk
+from monitor.process.operator_desk import OperatorDesk, shelf_of
 from monitor.process.presence import Presence
 from monitor.process.rig_time import RigTime
 from monitor.process.startup_grace import Patience
 from monitor.signals import MONITOR_RESET
-from rigwatch.wire.bus import Bus, CommandCheck, joined, serve_alarm_list
+from rigwatch.wire.bus import (
+    Bus,
+    CommandCheck,
+    ShelvedAlarm,
+    joined,
+    serve_alarm_list,
+    serve_shelf,
+)
 from rigwatch.wire.delivery import POSITION_WRONG, Item, SampleReader
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.host import (
@@ -103,7 +110,7 @@ class MonitorProcess:
         self._router_lost_at: float | None = None
         self._recorder: Health | None = None
         self._unsuitable = ""
-        self._standing = self.rig.alarms.standing()
+        self._standing, self._shelf = self.rig.alarms.standing(), list[ShelvedAlarm]()
         check = CommandCheck(bus, config.bus.security)
         self._operators = OperatorDesk(bus, check)
         bus.announce()
@@ -117,8 +124,10 @@ class MonitorProcess:
             standing = self.rig.alarms.restore(newest, time.time_ns())
             self.say([*just_returned(newest), *standing])
             self._standing = self.rig.alarms.standing()
+            self._shelf = shelf_of(self.rig.alarms)
         # Only now: before, an answer would say that no alarm stands.
         serve_alarm_list(bus, lambda: self._explainer.with_causes(self._standing))
+        serve_shelf(bus, lambda: self._shelf)
         self._models = ModelDesk(bus, self.rig, Path(section.model), check)
         self._judged_ns = 0
         self.reader = SampleReader(bus, self._done, config.daq.ring if self._done else 0)
@@ -170,6 +179,7 @@ class MonitorProcess:
                 self.say(self.rig.alarms.report(name, at, active=holds))
         if reason := self._links.lasting_reason(seen):
             self.say(self.rig.alarms.reword("link", reason, now_ns))
+        self._shelf = shelf_of(self.rig.alarms)
         self._announce_router(seen)
         self._announce_clock_step(seen)
         if self._health.is_due(seen.monotonic_ns):

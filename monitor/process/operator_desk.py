@@ -1,9 +1,16 @@
-"""Executes operators' commands for alarms, after verifying who sends them."""
+"""Executes operators' commands for alarms after verifying who sends them; tells what is shelved."""
 
 from collections.abc import Iterator
 
 from monitor.alarms import AlarmManager, Announcement, bounded
-from rigwatch.wire.bus import MOST_COMMANDS, Bus, CommandCheck, command_mark, marked
+from rigwatch.wire.bus import (
+    MOST_COMMANDS,
+    Bus,
+    CommandCheck,
+    ShelvedAlarm,
+    command_mark,
+    marked,
+)
 from rigwatch.wire.messages import COMMANDS, MONITOR_STALE, AlarmCommand, Event
 
 SOURCE = "monitor/alarms"
@@ -47,3 +54,14 @@ class OperatorDesk:
         text = f"{kept.action} of {kept.name} by {kept.user} refused: {verdict.refusal}"
         mark = command_mark(command)
         return [Event(SOURCE, now_ns, "warning", "alarm_command_refused", f"{text} ({mark})")]
+
+
+def shelf_of(alarms: AlarmManager) -> list[ShelvedAlarm]:
+    """What operators have put aside, as it is told."""
+    return [
+        ShelvedAlarm(
+            one.alarm.name, one.shelved_until_ns, one.alarm.user, one.alarm.identity,
+            one.text, one.active,
+        )
+        for one in alarms.shelved()
+    ]  # fmt: skip

@@ -7,7 +7,13 @@ from pathlib import Path
 import pytest
 
 from rigwatch.keys import Authority
-from rigwatch.wire.bus import Bus, ModelRequest, ask_alarm_list, ask_for_model, command_alarms
+from rigwatch.wire.bus import (
+    Bus,
+    ModelRequest,
+    ask_alarm_list,
+    ask_for_model,
+    command_alarms,
+)
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.messages import COMMANDS, ESTIMATES, EVENTS, HEALTH, Alarm, AlarmCommand
 from tests.access.secured_rig import SecuredRig, make_keys
@@ -21,7 +27,7 @@ pytestmark = pytest.mark.long
 def reset_by(bus: Bus) -> list[Alarm]:
     """Alarms that a reset by ann changes; the router or the monitor may be who refuses it."""
     try:
-        return command_alarms(bus, AlarmCommand("*", "reset", "ann", 1))[0]
+        return command_alarms(bus, AlarmCommand("*", "reset", "ann", 1)).changed
     except BusError:
         return []
 
@@ -77,11 +83,12 @@ def test_an_operator_acts_in_the_own_name_only_and_a_revoked_one_not_at_all(
     kill(publisher)
     eventually(lambda: {"stale", "monitor_stale"} <= set(standing(ann)), "the alarms")
 
-    seen, why = command_alarms(ann, AlarmCommand("monitor_stale", "acknowledge", "bob", 1))
-    assert not seen
-    assert "it is signed by ann, expected bob" in why
-    seen, why = command_alarms(ann, AlarmCommand("monitor_stale", "acknowledge", "ann", 1))
-    assert [(a.state, a.user, a.identity) for a in seen] == [("acknowledged", "ann", "proved")]
+    answer = command_alarms(ann, AlarmCommand("monitor_stale", "acknowledge", "bob", 1))
+    assert not answer.changed
+    assert "it is signed by ann, expected bob" in answer.refusal
+    answer = command_alarms(ann, AlarmCommand("monitor_stale", "acknowledge", "ann", 1))
+    (seen,) = answer.changed
+    assert (seen.state, seen.user, seen.identity) == ("acknowledged", "ann", "proved")
 
     recorded.drain()
     done = rigwatch("ack", str(rig.path), "--json")
@@ -96,12 +103,12 @@ def test_an_operator_acts_in_the_own_name_only_and_a_revoked_one_not_at_all(
 
     # The command line could be changed: the monitor verifies.
     genuine: AlarmCommand = recorded.get(timeout=PATIENCE)
-    _, why = command_alarms(ann, AlarmCommand("*", "acknowledge", "bob", 1))
+    why = command_alarms(ann, AlarmCommand("*", "acknowledge", "bob", 1)).refusal
     assert "it is signed by ann, expected bob" in why
     assert "it is not signed" in refusal(ann, AlarmCommand("*", "reset", "ann", 1))
     assert "it was received before" in refusal(ann, genuine)
-    answer = ask_for_model(ann, ModelRequest("rollback", "", "bob", ""))
-    assert "it is signed by ann, expected bob" in answer.text
+    reply = ask_for_model(ann, ModelRequest("rollback", "", "bob", ""))
+    assert "it is signed by ann, expected bob" in reply.text
     # Verified, then refused for another reason: there is nothing to roll back to.
     assert "no version before" in ask_for_model(ann, ModelRequest("rollback", "", "ann", "")).text
 
@@ -121,6 +128,6 @@ def test_an_operator_acts_in_the_own_name_only_and_a_revoked_one_not_at_all(
         "the router has opened anew",
     )
     assert reset_by(ann) == []
-    _, why = command_alarms(bob, AlarmCommand("nothing", "reset", "bob", 1))
+    why = command_alarms(bob, AlarmCommand("nothing", "reset", "bob", 1)).refusal
     assert "no such alarm" in why
     assert {entry[1:] for entry in journal(rig)} == {("ann", "proved")}

@@ -17,7 +17,7 @@ from monitor.process.link_watch import LinkWatch, Seen
 from monitor.process.loop import MonitorProcess, suitable_model
 from rigwatch.wire.access import REGISTER, Issued, Register, signer_of
 from rigwatch.wire.bus.commands import alarm_command
-from rigwatch.wire.bus.commands.alarm_command import command_alarms
+from rigwatch.wire.bus.commands.alarm_command import CommandAnswer, command_alarms
 from rigwatch.wire.bus.commands.alarm_list import ask_alarm_list, serve_alarm_list
 from rigwatch.wire.bus.commands.command_check import signed
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
@@ -26,7 +26,6 @@ from rigwatch.wire.delivery.ring import SampleRing
 from rigwatch.wire.errors import BusError, ConfigError
 from rigwatch.wire.messages.blocks import concatenate
 from rigwatch.wire.messages.message_types import (
-    Alarm,
     AlarmCommand,
     EstimateBlock,
     Health,
@@ -234,7 +233,7 @@ def test_of_two_operators_at_once_one_is_obeyed_and_only_the_other_is_refused(
     bench.turn()
     at = Occasion("rig", 7, 0, time.time_ns())
     bench.monitor.say(bench.monitor.rig.alarms.report("disk", at, active=True))
-    answers: dict[str, tuple[list[Alarm], str]] = {}
+    answers: dict[str, CommandAnswer] = {}
 
     def acknowledge(user: str) -> None:
         signer = signer_of(bench.config.bus.security, "")
@@ -248,8 +247,8 @@ def test_of_two_operators_at_once_one_is_obeyed_and_only_the_other_is_refused(
     bench.turn()
     for user in users:
         user.join()
-    obeyed = {user for user, (changes, _) in answers.items() if changes}
-    refused = {user: why for user, (_, why) in answers.items() if why}
+    obeyed = {user for user, answer in answers.items() if answer.changed}
+    refused = {user: one.refusal for user, one in answers.items() if one.refusal}
     assert len(obeyed) == 1
     assert refused.keys() == {"ann", "bob"} - obeyed
     assert [*refused.values()] == ["acknowledge of disk refused: it is acknowledged"]
@@ -287,8 +286,9 @@ def test_a_command_that_dies_with_its_monitor_reaches_the_next_or_is_told(
     waiting = sent()
     bench.start()
     assert wait_until(lambda: bench.turn() or not waiting.is_alive(), PATIENCE)
-    changes, refusal = told[1]  # type: ignore[misc]
-    assert ([one.state for one in changes], refusal) == (["acknowledged"], "")
+    answer = told[1]
+    assert isinstance(answer, CommandAnswer)
+    assert ([one.state for one in answer.changed], answer.refusal) == (["acknowledged"], "")
 
 
 def test_a_killed_monitor_has_its_alarms_and_misses_no_sample(bench: Bench) -> None:

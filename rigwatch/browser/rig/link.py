@@ -7,7 +7,14 @@ from typing import Any
 
 from monitor.model import load_model
 from rigwatch.browser.rig.live_view import LiveView
-from rigwatch.wire.bus import Bus, ask_alarm_list, command_alarms, connect, unique_process
+from rigwatch.wire.bus import (
+    Bus,
+    CommandAnswer,
+    ask_alarm_list,
+    command_alarms,
+    connect,
+    unique_process,
+)
 from rigwatch.wire.errors import BusError, RigwatchError
 from rigwatch.wire.messages import ALARMS, ESTIMATES, HEALTH, SAMPLES, Alarm, AlarmCommand
 from rigwatch.wire.rig_config import load_rig
@@ -69,8 +76,8 @@ class RigLink:
         with self._lock:
             return self._live.alarm(name)
 
-    def command(self, command: AlarmCommand) -> tuple[list[Alarm], str]:
-        """Send an operator's command; returns the changes, and the reason of a refusal.
+    def command(self, command: AlarmCommand) -> CommandAnswer:
+        """Send an operator's command and collect what is said to it.
 
         Raises:
             BusError: no monitor answers.

@@ -135,10 +135,10 @@ async def rig_alarm(request: Request) -> Response:
         raise RigwatchError(f"found action {action!r}, expected one of {', '.join(ACTIONS)}")
     user = operator_name(_link(request).config.bus)
     command = AlarmCommand(name, action, user, time.time_ns(), "from the workbench")
-    changed, refusal = await run_in_threadpool(_link(request).command, command)
-    if refusal:
-        raise RigwatchError(refusal)
-    return answer({"changed": [alarm.name for alarm in changed]})
+    said = await run_in_threadpool(_link(request).command, command)
+    if said.refusal:
+        raise RigwatchError(said.refusal)
+    return answer({"changed": [alarm.name for alarm in said.changed]})
 
 
 async def rig_study(request: Request) -> Response:

@@ -10,15 +10,13 @@ from typing import TYPE_CHECKING
 from rigwatch.commands.common import add_user
 
 if TYPE_CHECKING:
-    from rigwatch.wire.bus import Bus
-    from rigwatch.wire.messages import Alarm, AlarmCommand
+    from rigwatch.wire.messages import AlarmCommand
 
 HELP = "acknowledge, reset or shelve alarms of a rig"
 EXAMPLE = """  rigwatch ack configs/demo.toml --user ann
   rigwatch ack configs/demo.toml dry_friction --user ann --reset
   rigwatch ack configs/demo.toml loss --user ann --shelve --text "cable on order\""""
 TIMEOUT = 3.0
-SHELF = ("alarm_shelved", "alarm_unshelved")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Send the command and print the changes; 1 if there are none."""
     from rigwatch.commands.alarms.alarms import as_line
     from rigwatch.wire.access import operator_name
-    from rigwatch.wire.bus import connect, unique_process
+    from rigwatch.wire.bus import command_alarms, connect, unique_process
     from rigwatch.wire.messages import json_fields
     from rigwatch.wire.rig_config import load_rig
 
@@ -53,35 +51,17 @@ def run(arguments: argparse.Namespace) -> int:
     command = command_of(arguments, operator_name(config.bus, arguments.user))
     bus = connect(config, unique_process("ack"), TIMEOUT)
     try:
-        changed, shelf, refusal = sent(bus, command)
+        answer = command_alarms(bus, command)
     finally:
         bus.close()
     if arguments.json:
-        alarms = [json_fields(alarm) for alarm in changed]
-        print(json.dumps({"changed": alarms, "shelf": shelf, "refusal": refusal}))
+        alarms = [json_fields(alarm) for alarm in answer.changed]
+        print(json.dumps({"changed": alarms, "shelf": answer.shelf, "refusal": answer.refusal}))
     else:
-        print("\n".join([*map(as_line, changed), *shelf]) or "nothing changed")
-        if refusal:
-            print(f"rigwatch: {refusal}", file=sys.stderr)
-    return 0 if changed or shelf else 1
-
-
-def sent(bus: "Bus", command: "AlarmCommand") -> "tuple[list[Alarm], list[str], str]":
-    """Send a command.
-
-    Returns:
-        the changed alarms, what was put on the shelf or taken off it, and the reason of a refusal.
-    """
-    from rigwatch.wire.bus import command_alarms
-    from rigwatch.wire.messages import EVENTS
-
-    events = bus.subscribe(EVENTS)
-    try:
-        changed, refusal = command_alarms(bus, command)
-        said = [one.text for one in events.drain() if one.code in SHELF]
-    finally:
-        events.close()
-    return changed, [text for text in said if command.user in text], refusal
+        print("\n".join([*map(as_line, answer.changed), *answer.shelf]) or "nothing changed")
+        if answer.refusal:
+            print(f"rigwatch: {answer.refusal}", file=sys.stderr)
+    return 0 if answer.changed or answer.shelf else 1
 
 
 def command_of(arguments: argparse.Namespace, user: str) -> "AlarmCommand":

@@ -1,17 +1,20 @@
-"""`rigwatch alarms`: lists the active alarms of a rig, or follows changes."""
+"""`rigwatch alarms`: lists the active alarms of a rig and the shelved ones, or follows changes."""
 
 import argparse
+import contextlib
 import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rigwatch.wire.bus import Subscription
+    from rigwatch.wire.bus import Bus, ShelvedAlarm, Subscription
     from rigwatch.wire.messages import Alarm
 
 HELP = "list a rig's alarms, or follow them"
 EXAMPLE = """  rigwatch alarms configs/demo.toml
+  rigwatch alarms configs/demo.toml --shelved
   rigwatch alarms configs/demo.toml --follow --json"""
 TIMEOUT = 3.0
 
@@ -19,7 +22,13 @@ TIMEOUT = 3.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("config", type=Path, metavar="CONFIG", help="configuration of the rig")
-    parser.add_argument("--follow", action="store_true", help="continue with every change")
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--follow", action="store_true", help="continue with every change")
+    what.add_argument(
+        "--shelved",
+        action="store_true",
+        help="only the alarms that were shelved: until when, by whom, and why",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -30,6 +39,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     bus = connect(load_rig(arguments.config), unique_process("alarms"), TIMEOUT)
     try:
+        if arguments.shelved:
+            _print_shelf(bus, arguments.json)
+            return 0
         changes = bus.subscribe(ALARMS) if arguments.follow else None
         standing = ask_alarm_list(bus, TIMEOUT)
         if changes is not None:
@@ -39,9 +51,30 @@ def run(arguments: argparse.Namespace) -> int:
         else:
             told = "\n\n".join(as_text(alarm, arguments.config) for alarm in standing)
             print(told or "no active alarms")
+            _print_shelved(bus)
     finally:
         bus.close()
     return 0
+
+
+def _print_shelf(bus: "Bus", as_json: bool) -> None:
+    from rigwatch.wire.bus import ask_shelf
+
+    shelved = ask_shelf(bus, TIMEOUT)
+    if as_json:
+        print(json.dumps([asdict(one) for one in shelved], indent=2))
+    else:
+        print("\n".join(map(as_shelf_line, shelved)) or "no shelved alarms")
+
+
+def _print_shelved(bus: "Bus") -> None:
+    """What is not announced, below what is; nothing where only the witness is there to answer."""
+    from rigwatch.wire.bus import ask_shelf
+    from rigwatch.wire.errors import BusError
+
+    with contextlib.suppress(BusError):
+        for one in ask_shelf(bus, TIMEOUT):
+            print(as_shelf_line(one))
 
 
 def _follow(standing: "list[Alarm]", changes: "Subscription", as_json: bool) -> None:
@@ -72,6 +105,22 @@ def as_line(alarm: "Alarm") -> str:
     who = f" by {alarm.user}{proved}" if alarm.user else ""
     state = alarm.state.replace("_", " ")
     return f"{when:%Y-%m-%d %H:%M:%S} {alarm.severity:8} {alarm.name}: {state}{who}{mark}"
+
+
+def as_shelf_line(shelved: "ShelvedAlarm") -> str:
+    """One line: the alarm, until when and by whom it is shelved, its condition, the remark."""
+    from datetime import datetime
+
+    from rigwatch.wire.messages import PROVED
+
+    until = datetime.fromtimestamp(shelved.until_ns / 1e9).astimezone()
+    proved = " (proved)" if shelved.identity == PROVED else ""
+    holds = "its condition holds" if shelved.active else "its condition does not hold"
+    why = f": {shelved.text}" if shelved.text else ""
+    return (
+        f"shelved until {until:%Y-%m-%d %H:%M:%S} by {shelved.user}{proved}: {shelved.name}, "
+        f"{holds}{why}"
+    )
 
 
 def as_text(alarm: "Alarm", config: Path) -> str:

@@ -38,14 +38,22 @@ _SAYS: dict[str, tuple[str, ...]] = {
 _ANSWERS = {
     "daq": (RING_KEY, "daq/device", "daq/receiver"),
     "recorder": (PAST_KEY,),
-    "monitor": ("ring/**", "monitor/standing", "monitor/receiver", "monitor/model"),
+    "monitor": (
+        "ring/**",
+        "monitor/standing",
+        "monitor/shelf",
+        "monitor/receiver",
+        "monitor/model",
+    ),
     "witness": ("ring/witness/**", "monitor/standing", "monitor/receiver"),
 }
 _TOKENS = {"daq": ("source/*",), "monitor": ("said/**",), "witness": ("said/witness/*",)}
 """Tokens with names, which their holder also sends and answers with."""
 _ASKS = {"operator": ("monitor/receiver", "monitor/model", "daq/device", "daq/receiver", PAST_KEY)}
 """The recorder of a headquarters has the certificate of an operator."""
-_EVERYBODY_ASKS = (RING_KEY, "ring/**", "monitor/standing", "source/*", "said/**")
+_EVERYBODY_ASKS = (
+    RING_KEY, "ring/**", "monitor/standing", "monitor/shelf", "source/*", "said/**",
+)  # fmt: skip
 
 LINKED = "router"
 """The role of routers, also of those of other sites."""

@@ -21,28 +21,34 @@ from rigwatch.wire.messages import (
 )
 
 TIMEOUT = 3.0
+SHELF = ("alarm_shelved", "alarm_unshelved")
+"""Codes of the events that tell what operators do to the shelf."""
 SETTLE = 0.2
 """Time for further answers after the first [s]."""
 
 
 @dataclass
-class _Answer:
+class CommandAnswer:
     """What the monitor said to one command.
 
     Attributes:
+        changed: the transitions.
+        shelf: what was put on the shelf or taken off it, a line each.
+        refusal: why nothing happens.
         interrupted: the link was down meanwhile, so that command or answer may be lost.
     """
 
     changed: list[Alarm] = field(default_factory=list)
+    shelf: list[str] = field(default_factory=list)
     refusal: str = ""
     interrupted: bool = False
 
     def __bool__(self) -> bool:
-        return bool(self.changed or self.refusal)
+        return bool(self.changed or self.shelf or self.refusal)
 
 
-def command_alarms(bus: Bus, command: AlarmCommand) -> tuple[list[Alarm], str]:
-    """Sign and send a command; the transitions in the monitor's reply, and the reason of a refusal.
+def command_alarms(bus: Bus, command: AlarmCommand) -> CommandAnswer:
+    """Sign and send a command, and collect what is said to it.
 
     A command that may have been lost with the link, as when the router opens anew, or with a
     monitor that has started anew meanwhile, is sent again.
@@ -59,7 +65,7 @@ def command_alarms(bus: Bus, command: AlarmCommand) -> tuple[list[Alarm], str]:
             answer = _answer_to(bus, command, changes, events)
         if not answer and not _monitors(bus):
             raise no_monitor(bus)
-        return answer.changed, answer.refusal
+        return answer
     finally:
         changes.close()
         events.close()
@@ -67,18 +73,22 @@ def command_alarms(bus: Bus, command: AlarmCommand) -> tuple[list[Alarm], str]:
 
 def _answer_to(
     bus: Bus, command: AlarmCommand, changes: Subscription, events: Subscription
-) -> _Answer:
+) -> CommandAnswer:
     _wait_for_monitor(bus, command)
     sent = signed(bus, command)
     bus.publish(COMMANDS, sent)
-    answer = _Answer()
+    answer = CommandAnswer()
     deadline = time.monotonic() + TIMEOUT / 2
     while time.monotonic() < deadline and not answer.refusal:
         alarm = changes.get(timeout=0.05)
-        if alarm is not None and alarm.user == command.user:
-            answer.changed.append(alarm)
+        said = events.drain()
+        shelf = [one.text for one in said if one.code in SHELF and command.user in one.text]
+        own = [alarm] if alarm is not None and alarm.user == command.user else []
+        answer.changed += own
+        answer.shelf += shelf
+        if own or shelf:
             deadline = min(deadline, time.monotonic() + SETTLE)
-        answer.refusal = refusal_of(sent, events.drain())
+        answer.refusal = refusal_of(sent, said)
         answer.interrupted |= not bus.connected()
     return answer
 

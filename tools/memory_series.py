@@ -1,5 +1,6 @@
-"""Memory of processes and size of a folder over a year."""
+"""Memory of processes over a long run: how fast it grows, and when it steps."""
 
+import csv
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,15 +18,8 @@ def memory_kb(pid: int) -> float:
     return float(found[0]) if found else float("nan")
 
 
-def folder_bytes(folder: Path) -> int:
-    """Size of all files in a folder [bytes]."""
-    total = 0
-    for path in folder.rglob("*"):
-        try:
-            total += path.stat().st_size if path.is_file() else 0
-        except OSError:
-            continue  # removed meanwhile
-    return total
+STEP_KB, BESIDE = 400.0, 5
+"""Least rise called a step [kB], and the looks on either side whose medians differ by it."""
 
 
 @dataclass
@@ -51,6 +45,31 @@ class Memory:
             return float("nan"), late[-1] / 1e3 if late else float("nan"), len(late)
         slope, level = np.polyfit(np.arange(len(late)), late, 1)
         return float(100.0 * slope * len(late) / level), late[-1] / 1e3, len(late)
+
+    def steps(self, name: str) -> list[tuple[int, float]]:
+        """Rises that stay, of the last process of that name: (look, kB), the first look is 0.
+
+        A rise that is gone within `BESIDE` looks, and one slower than that, is none.
+        """
+        looks = self.seen[name]
+        kb = _of_last(looks)
+        first, found = len(looks) - len(kb), list[tuple[int, float]]()
+        at = BESIDE
+        while at + BESIDE <= len(kb):
+            rise = float(np.median(kb[at : at + BESIDE]) - np.median(kb[at - BESIDE : at]))
+            if rise >= STEP_KB:
+                found.append((first + at, rise))
+                at += BESIDE - 1
+            at += 1
+        return found
+
+    def write(self, path: Path) -> None:
+        """All looks as a table: look, process, pid, kB."""
+        with path.open("w", encoding="ascii", newline="") as file:
+            table = csv.writer(file)
+            table.writerow(["session", "process", "pid", "kb"])
+            for name, looks in self.seen.items():
+                table.writerows([i, name, pid, kb] for i, (pid, kb) in enumerate(looks))
 
 
 def _of_last(looks: Iterable[tuple[int, float]]) -> list[float]:
