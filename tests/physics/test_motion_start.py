@@ -110,6 +110,28 @@ def test_an_effect_at_the_sensor_of_the_motion_keeps_its_value():
     assert values["g"] != compiled.system.parameters["g"].value
 
 
+COUPLED = """
+parameters.up = { value = 40.0, unit = "N" }
+parameters.corner = { value = 1.5, unit = "1/s", fixed = true }
+quantities.balance = { expression = "(f + up - c*v - k*x + load)/m", unit = "m/s^2" }
+states.mean = { unit = "m/s^2", derivative = "corner*(balance - mean)" }
+outputs.acceleration = { unit = "m/s^2", expression = "balance - mean" }
+"""
+
+
+def test_a_constant_force_that_the_accelerometer_does_not_show_is_held_by_the_motion():
+    lines = DRIVEN.replace("(f - c*v", "(f + up - c*v").splitlines()
+    text = "\n".join([line for line in lines if not line.startswith("outputs.acc")]) + COUPLED
+    recording, noise = recorded()
+    read, mean = recording.outputs.copy(), 0.0
+    for row in read:
+        row[1], mean = row[1] - mean, mean + 1.5 * DT * (row[1] - mean)
+    coupled = Recording(DT, recording.inputs, read)
+    compiled = compile_system(compose(parse(text, Model, "driven")))
+    found = motion_start(compiled, coupled, compiled.parameters, noise, 2)
+    assert abs(dict(zip(compiled.system.parameters, found, strict=True))["up"]) < 0.5
+
+
 def test_without_a_measured_motion_there_is_none():
     text = DRIVEN.replace(', measured = "position"', "").replace(', rate_of = "position"', "")
     recording, noise = recorded()

@@ -8,6 +8,7 @@ from rigwatch.physics.engine.fit.effect_states import EffectStates
 from rigwatch.physics.engine.fit.initial_state_projection import Tangent
 from rigwatch.physics.engine.fit.measured_recording import (
     motion_phases,
+    motion_rates,
     motion_recording,
     motion_widths,
 )
@@ -55,6 +56,7 @@ __all__ = [
     "initial_states",
     "joined",
     "motion_phases",
+    "motion_rates",
     "motion_recording",
     "motion_widths",
     "port_signals",

@@ -8,7 +8,9 @@ start of the window anyway. Hidden states come from samples that do not count in
 * states of effects run through all windows, as a restart in each would be a free constant.
 
 The first window of a recording determines its own hidden states and does not count. If a recording
-is one window, its first part determines them and does not count.
+is one window, its first part determines them and does not count. A short window may determine its
+hidden states so poorly that the next one diverges from where it ends. They are then led through all
+windows, each begun with the measured states as its channels have them.
 """
 
 import numpy as np
@@ -27,11 +29,43 @@ def continued(problem: Problem, parameters: FloatArray) -> Started:
     Raises:
         ModelError: the simulation diverged.
     """
-    found = problem.start_windows(parameters)
-    if not len(problem.hidden):
-        return found
-    if len(problem.starts) == len(problem.first_windows):
-        return _from_first_samples(problem, parameters)
+    shown, windows = problem.initial, len(problem.starts) > len(problem.first_windows)
+    try:
+        found = problem.start_windows(parameters)
+        if not len(problem.hidden):
+            return found
+        if not windows:
+            return _from_first_samples(problem, parameters)
+        return _from_windows_before(problem, parameters)
+    except ModelError:
+        if not (windows and len(problem.hidden)):
+            raise
+    return _counted(problem, parameters, _led(problem, parameters, shown), _first(problem))
+
+
+def _first(problem: Problem) -> BoolArray:
+    """Samples of the recordings' first windows, shape (windows, samples)."""
+    found = np.zeros(problem.measured.shape[:2], np.bool_)
+    found[problem.first_windows] = True
+    return found
+
+
+def _led(problem: Problem, parameters: FloatArray, shown: FloatArray) -> FloatArray:
+    """Initial states with hidden ones led through the windows, shape (windows, states).
+
+    Args:
+        problem, parameters: as for `continued`.
+        shown: initial states from the channels; the first window's hidden ones begin there.
+    """
+    problem.initial = shown.copy()
+    for rows in problem.window_order:
+        ended = problem.ends_before(parameters, rows)
+        problem.begin_at(rows, problem.hidden, ended[:, problem.hidden])
+    return problem.initial
+
+
+def _from_windows_before(problem: Problem, parameters: FloatArray) -> Started:
+    """Windows with hidden states continued from the best fit of the one before."""
     began = problem.initial.copy()
     hidden = _continued_from_previous(problem, parameters)
     if not np.isfinite(hidden).all():
@@ -40,9 +74,7 @@ def continued(problem: Problem, parameters: FloatArray) -> Started:
             " from one window to the next"
         )
     began[:, problem.hidden] = hidden
-    determining = np.zeros(problem.measured.shape[:2], np.bool_)
-    determining[problem.first_windows] = True
-    return _counted(problem, parameters, began, determining)
+    return _counted(problem, parameters, began, _first(problem))
 
 
 def _continued_from_previous(problem: Problem, parameters: FloatArray) -> FloatArray:

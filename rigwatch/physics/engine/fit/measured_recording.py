@@ -88,6 +88,30 @@ def motion_widths(model: Model, recording: Recording, parts: Sequence[int] = ())
     return found
 
 
+def motion_rates(model: Model, recording: Recording) -> FloatArray:
+    """Measured rates of the states whose balance an equation is, shape (n, balanced states).
+
+    Args:
+        model: the original model, not transformed.
+        recording: its inputs and outputs.
+
+    Raises:
+        ModelError: a channel has no valid sample.
+    """
+    cut, channels = _ends(recording, ()), _channels(model, recording)
+    found = [np.empty((len(recording), 0))]
+    for state in balanced_states(model):
+        signal, order = channels[state.channel], state.order + 1
+        if not np.isfinite(signal).any():
+            raise ModelError(f"{model.name}: found no valid sample of {state.channel!r}")
+        longest = max(np.split(signal, cut), key=len)
+        width = best_width(filled(longest), order)
+        rate = _smoothed_parts(signal, recording.dt, width, order, cut)
+        whole = _whole_kernel(signal, width, cut)
+        found.append(np.where(whole, rate, np.nan)[:, None])
+    return np.concatenate(found, axis=1)
+
+
 def motion_phases(model: Model, recording: Recording) -> dict[str, SensorPhase]:
     """Phase between each channel of the motion and the output that measures its rate.
 

@@ -4,20 +4,30 @@ Where channels measure some of a model's states, the others are free in every wi
 values the search over the parameters meets many minima and simulations that diverge. Driven by the
 measured motion the same equations are one stable run, whose error varies smoothly over decades of
 the parameters (see `whole_runs.py`). It ends near the optimum of the windows in a fraction of their
-time. What the outputs do not show, as the mean of an acceleration that an AC-coupled sensor takes
-away, is left to the fit over windows, and so is the noise of the motion.
+time.
+
+An output need not show all of a balance: an AC-coupled accelerometer takes away the mean, and a
+force that is constantly wrong would throw every window off. The rates of the measured motion itself
+are therefore predicted too, each only as well as its own size: that holds what is slow and leaves
+the rest to the outputs.
 """
 
+from dataclasses import replace
+
 import numpy as np
+from msgspec import structs
 
 from rigwatch.physics.engine.compile import CompiledSystem, compile_system
 from rigwatch.physics.engine.equations import (
+    Model,
+    Output,
     along_measured_motion,
+    balanced_states,
     compose,
     has_hidden_states,
     predicted_outputs,
 )
-from rigwatch.physics.engine.fit import Recording, motion_recording
+from rigwatch.physics.engine.fit import Recording, motion_rates, motion_recording
 from rigwatch.physics.engine.search.whole_runs import WholeRuns
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
@@ -26,6 +36,8 @@ SETTLING = 0.1
 """Share of the shortest part of a recording in which hidden states settle; at most `LONGEST`."""
 LONGEST = 1.0
 """Longest time for that [s]."""
+RATE = "rate_of_"
+"""Prefix of the outputs that are rates of the motion."""
 
 
 def motion_start(
@@ -52,7 +64,7 @@ def motion_start(
     kept = predicted_outputs(model) if has_hidden_states(model) else ()
     if not kept or not system.free:
         return None
-    along = along_measured_motion(model)
+    along = _with_rates(along_measured_motion(model), model)
     placed = [each for each in system.placements if each.port in along.ports]
     shown = [list(model.outputs).index(name) for name in kept]
     shortest = min(recording.parts or (len(recording),)) * recording.dt
@@ -60,9 +72,31 @@ def motion_start(
     try:
         driven = compile_system(compose(along, placed))
         motion = motion_recording(model, recording, settling=min(LONGEST, SETTLING * shortest))
+        rates = motion_rates(model, recording)
+        rates[np.isnan(motion.outputs).all(axis=1)] = np.nan
+        motion = replace(motion, outputs=np.column_stack([motion.outputs, rates]))
+        sizes = np.concatenate([noise[shown], _sizes(rates)])
         own = driven.vector({name: values[name] for name in driven.system.parameters})
-        search = WholeRuns(driven, [motion], noise[shown], start=own, substeps=substeps)
+        search = WholeRuns(driven, [motion], sizes, start=own, substeps=substeps)
         found, _ = search.first_search()
     except ModelError:
         return None
     return np.array([found.get(name, value) for name, value in values.items()])
+
+
+def _sizes(rates: FloatArray) -> FloatArray:
+    """Root mean square of each column; 1 without any size."""
+    found = np.sqrt(np.mean(np.nan_to_num(rates) ** 2, axis=0))
+    return np.where(found > 0, found, 1.0)
+
+
+def _with_rates(along: Model, model: Model) -> Model:
+    """The model along its motion, with the rates of the motion as further outputs."""
+    rates = {
+        RATE + state.name: Output(
+            unit=f"({model.states[state.name].unit})/s",
+            expression=model.states[state.name].derivative,
+        )
+        for state in balanced_states(model)
+    }
+    return structs.replace(along, outputs=along.outputs | rates)
