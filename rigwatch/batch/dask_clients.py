@@ -176,6 +176,8 @@ def _check_workers(client: Any, where: str, wait: float) -> None:
     except TimeoutError:
         raise BatchError(f"{where}: the scheduler has no worker, expected at least one") from None
     for worker, version in sorted(found.items()):
+        if type(version).__name__ == "CommClosedError":
+            continue  # it ended while it was asked: another one comes, or the work waits for one
         if isinstance(version, Exception):
             raise BatchError(f"{where}: worker {worker} cannot load rigwatch: {version}")
         if version != __version__:

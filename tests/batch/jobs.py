@@ -6,6 +6,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+from rigwatch.version import __version__
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -39,6 +41,16 @@ def deadly(path: Path, *, once: str = "", always: str = "") -> int:
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return number
+
+
+def version_or_death(mark: str) -> str:
+    """What a worker says of itself; the first that is asked is killed instead."""
+    try:
+        Path(mark).touch(exist_ok=False)
+    except FileExistsError:
+        return __version__
+    os.kill(os.getpid(), signal.SIGKILL)
+    raise AssertionError("a killed process goes on")
 
 
 def make_files(folder: Path, count: int) -> Path:

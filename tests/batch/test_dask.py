@@ -4,17 +4,18 @@ import os
 import signal
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 import rigwatch
-from rigwatch.batch import executor_on
+from rigwatch.batch import dask_clients, executor_on
 from rigwatch.batch.dask_clients import QUIET, prologue
 from rigwatch.commands import main
 from rigwatch.wire.errors import BatchError, ConfigError, MissingExtraError
 from tests.batch.cluster import Cluster
-from tests.batch.jobs import ROOT, deadly, environment, make_files, sizes
+from tests.batch.jobs import ROOT, deadly, environment, make_files, sizes, version_or_death
 from tests.waiting import eventually
 
 pytestmark = [pytest.mark.long, pytest.mark.xdist_group("dask")]
@@ -64,6 +65,16 @@ def test_killed_workers_and_a_killed_client_change_no_byte(cluster, files, tmp_p
     rigwatch.map(sizes, [files], results=tmp_path / "plain.jsonl", pause=PAUSE)
     assert again.failed == {}
     assert target.read_bytes() == (tmp_path / "plain.jsonl").read_bytes()
+
+
+def test_a_worker_that_ends_while_it_is_asked_for_its_version_costs_nothing(
+    cluster, files, tmp_path, monkeypatch
+):
+    mark = tmp_path / "died"
+    monkeypatch.setattr(dask_clients, "_version", partial(version_or_death, str(mark)))
+    with executor_on(cluster.address) as executor:
+        assert mark.exists()
+        assert rigwatch.map(sizes, [files], executor=executor).done == COUNT
 
 
 def test_a_unit_that_kills_every_worker_is_named(cluster, files):
