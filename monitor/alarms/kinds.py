@@ -195,7 +195,8 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "wiring_sign",
         "critical",
         "position and acceleration have opposite signs; the rig is not monitored",
-        "Reverse the sensor or its gain in the configuration, then restart the monitor.",
+        "Reverse the sensor or its gain in the configuration, then restart the monitor. If all is "
+        "as it is to be: `rigwatch accept CONFIG wiring_sign`.",
         _AT_ONCE,
     ),
     AlarmKind(
@@ -203,7 +204,8 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "critical",
         "acceleration and position disagree about the size of the motion; the rig is not monitored",
         "Check unit, gain and range of both channels (mm or m, g or m/s^2, range of the "
-        "amplifier), then restart the monitor.",
+        "amplifier), then restart the monitor. If all is as it is to be: `rigwatch accept CONFIG "
+        "wiring_scale`.",
         _AT_ONCE,
     ),
     AlarmKind(
@@ -211,7 +213,8 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "critical",
         "position and acceleration do not show the same motion; the rig is not monitored",
         "Look for swapped channels, a reversed sensor behind a filter, or a sensor on another "
-        "part, then restart the monitor.",
+        "part, then restart the monitor. If all is as it is to be: `rigwatch accept CONFIG "
+        "wiring_swapped`.",
         _AT_ONCE,
     ),
     AlarmKind(
@@ -221,7 +224,7 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "with the other sign; the rig is not monitored",
         "Check sign, unit, gain and range of the drive's channel, and that this device is of the "
         "rig that the model was made of, then restart the monitor. If all is right, make the model "
-        "anew.",
+        "anew, or `rigwatch accept CONFIG wiring_drive`.",
         _AT_ONCE,
     ),
     # The sensors: one alarm per channel.

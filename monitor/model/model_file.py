@@ -5,7 +5,7 @@ back gives the same estimates to the last bit.
 """
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta, field, structs
 
@@ -22,6 +22,8 @@ from rigwatch.wire.rig_config import FASTEST, SLOWEST
 from rigwatch.wire.typed_files import Section, load, parse
 
 Floats = tuple[float, ...]
+Wiring = Literal["wiring_sign", "wiring_scale", "wiring_swapped", "wiring_drive"]
+"""What the wiring check finds, by the name of its alarm."""
 
 
 class FunctionSection(Section, frozen=True, kw_only=True):
@@ -165,6 +167,9 @@ class RigModel(Section, frozen=True, kw_only=True):
 
     sample_rate: Annotated[float, Meta(ge=SLOWEST, le=FASTEST, description="[Hz]")]
     channels: Annotated[tuple[str, ...], Meta(min_length=2, description="input, position, …")]
+    accepted_wiring: Annotated[
+        tuple[Wiring, ...], Meta(description="which a person has said is as it is to be")
+    ] = ()
     plant: Plant
     friction: FrictionSection
     noise: NoiseSection

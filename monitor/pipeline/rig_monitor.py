@@ -180,6 +180,8 @@ class RigMonitor:
             ModelError: it needs other channels or filters.
         """
         self._pipeline.adopt(model)
+        if self._wiring is not None:
+            self._wiring.adopt(model)
 
     def learn(self, block: SampleBlock) -> None:
         """Process a block that an earlier run has published: update the state, publish nothing."""

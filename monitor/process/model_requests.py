@@ -6,12 +6,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import msgspec
+from msgspec import structs
 
 from monitor.model import RigModel, model_text, parse_model
 from monitor.model import model_versions as versions
 from monitor.pipeline import RigMonitor, check_can_follow
+from monitor.wiring import WIRING
 from rigwatch.wire.bus import KEY, PATIENCE, Bus, CommandCheck, ModelReply, ModelRequest
-from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.errors import ModelError, RigwatchError
 from rigwatch.wire.messages import LONGEST_NAME, LONGEST_TEXT, Identity, ModelChange
 from rigwatch.wire.typed_files import JsonError, json_value
 
@@ -112,7 +114,8 @@ class ModelDesk:
         if request.action == "rollback":
             versions.roll_back(self._path, place.t_ns, author)
         else:
-            versions.install(self._path, request.model, place.t_ns, author)
+            step = request.action
+            versions.install(self._path, _text(request, model), place.t_ns, author, step)
         self._rig.adopt(model)
         return ModelChange(
             place.device,
@@ -129,7 +132,28 @@ class ModelDesk:
     def _requested_model(self, request: ModelRequest) -> RigModel:
         if request.action == "rollback":
             return parse_model(versions.version_before(self._path), str(self._path))
+        if request.action == "accept":
+            return self._accepting(request.model)
         return parse_model(request.model, "the new model")
+
+    def _accepting(self, name: str) -> RigModel:
+        """The present model with the person's word for the wiring that fails.
+
+        Raises:
+            ModelError: no alarm of the wiring stands by this name.
+        """
+        if name not in WIRING or not self._rig.alarms.holds(name):
+            raise ModelError(
+                f"found no alarm {name!r} of the wiring whose condition holds, expected one of "
+                f"{', '.join(WIRING)} that does"
+            )
+        known = dict.fromkeys((*self._rig.model.accepted_wiring, name))
+        return structs.replace(self._rig.model, accepted_wiring=tuple(known))
+
+
+def _text(request: ModelRequest, model: RigModel) -> str:
+    """The model file's text; a promoted one is kept as it came."""
+    return request.model if request.action == "promote" else model_text(model)
 
 
 def _bounded(request: ModelRequest) -> ModelRequest:

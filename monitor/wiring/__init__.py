@@ -3,7 +3,7 @@
 At the monitor's start (`WiringCheck`), and of recordings that a model is made of.
 """
 
-from monitor.wiring.recorded_wiring import check_recorded
+from monitor.wiring.recorded_wiring import recorded_wiring
 from monitor.wiring.wiring_check import DRIVE, WIRING, WiringCheck
 
-__all__ = ["DRIVE", "WIRING", "WiringCheck", "check_recorded"]
+__all__ = ["DRIVE", "WIRING", "WiringCheck", "recorded_wiring"]

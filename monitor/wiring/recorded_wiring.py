@@ -4,32 +4,32 @@ from collections import Counter
 
 import numpy as np
 
+from monitor.model import Wiring
 from monitor.signals import Recording
 from monitor.wiring.motion_ratio import MotionRatio, motion_ratio
 from monitor.wiring.wiring_check import GAIN, PHASE, SCALE, SIGN, WINDOW, wrong_wiring
-from rigwatch.wire.errors import ModelError
 
 
-def check_recorded(recording: Recording) -> None:
-    """Refuse a recording if most of its seconds of motion show wrong wiring.
+def recorded_wiring(recording: Recording) -> tuple[Wiring, str] | None:
+    """What most of a recording's seconds of motion show to be wired wrongly; None if nothing.
 
     Only a position in m and an acceleration in m/s^2, one each, can be compared.
 
-    Raises:
-        ModelError: says what is wrong.
+    Returns:
+        the name of the alarm that a monitor raises, and what is wrong in words.
     """
     pair = [[n for n, u in recording.units.items() if u == unit] for unit in ("m", "m/s^2")]
     if any(len(names) != 1 for names in pair):
-        return
+        return None
     (position,), (acceleration,) = pair
     found = _ratios(recording, position, acceleration)
-    reasons = Counter(filter(None, map(wrong_wiring, found)))
+    reasons = Counter[Wiring](reason for one in found if (reason := wrong_wiring(one)))
     if 2 * reasons.total() <= len(found):
-        return
+        return None
     reason, _ = reasons.most_common(1)[0]
     gain = float(np.median([one.gain for one in found]))
     phase = float(np.median([abs(one.phase) for one in found]))
-    raise ModelError(f"{recording.name}: {_told(reason, position, acceleration, gain, phase)}")
+    return reason, f"{recording.name}: {_told(reason, position, acceleration, gain, phase)}"
 
 
 def _ratios(recording: Recording, position: str, acceleration: str) -> list[MotionRatio]:

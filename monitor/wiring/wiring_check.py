@@ -7,12 +7,14 @@ The drive is compared where a transfer function predicts the acceleration from i
 reference, which hides a difference once it is learned. One good window passes until the device or
 the monitor starts again. After a failure nothing is judged until then: a reference learned with
 wrong wiring would count as healthy. From the first bad window on nothing is judged either, until a
-good one; it takes the second to be told.
+good one; it takes the second to be told. What a person has accepted, which the model says, passes.
 """
+
+from typing import Literal, get_args
 
 import numpy as np
 
-from monitor.model import RigModel, TransferPlant
+from monitor.model import RigModel, TransferPlant, Wiring
 from monitor.signals import Condition, above, usable
 from monitor.wiring.drive_ratio import ModelledDrive, drive_ratio
 from monitor.wiring.motion_ratio import MotionRatio, motion_ratio
@@ -34,9 +36,8 @@ DRIVE_GAIN = 5.0
 friction and faults leave 0.55 to 1.4 on the simulated rig and on one simulated by others; units
 differ by ten or more.
 """
-SIGN, SCALE, SWAPPED = "wiring_sign", "wiring_scale", "wiring_swapped"
-DRIVE = "wiring_drive"
-WIRING = (SIGN, SCALE, SWAPPED, DRIVE)
+WIRING: tuple[Wiring, ...] = get_args(Wiring)
+SIGN, SCALE, SWAPPED, DRIVE = WIRING
 
 
 class WiringCheck:
@@ -52,9 +53,17 @@ class WiringCheck:
         compared = drive and isinstance(model.plant, TransferPlant)
         self._drive = ModelledDrive(model) if compared else None
         self._noise = model.noise.residual
+        self._accepted = frozenset[str](model.accepted_wiring)
         self._length = round(WINDOW * model.sample_rate)
         self._boot = self._next = -1
         self._restart()
+
+    def adopt(self, model: RigModel) -> None:
+        """Go on with what is accepted by now; what had failed is checked again for the rest."""
+        self._accepted = frozenset[str](model.accepted_wiring)
+        if self._failed in self._accepted:
+            self._restart()
+            self._fails = 1  # in doubt until a window has passed
 
     def _restart(self) -> None:
         self._passed = self._sensors_agree = False
@@ -147,8 +156,9 @@ class WiringCheck:
         if found is None:
             return
         reason: str | None = "" if self._sensors_agree else wrong_wiring(found)
+        reason = "" if reason in self._accepted else reason
         self._sensors_agree = not reason
-        if self._drive is not None and not reason:
+        if self._drive is not None and not reason and DRIVE not in self._accepted:
             reason = self._wrong_drive(window)
         if reason is None:
             self._fails = 0
@@ -168,7 +178,7 @@ class WiringCheck:
         return "" if 1 / DRIVE_GAIN < ratio < DRIVE_GAIN else DRIVE
 
 
-def wrong_wiring(found: MotionRatio) -> str:
+def wrong_wiring(found: MotionRatio) -> Wiring | Literal[""]:
     """What is wrong with the wiring; empty if it is right."""
     sized, turned = 1 / GAIN < found.gain < GAIN, abs(found.phase)
     if sized and turned > 180 - REVERSED:

@@ -29,7 +29,7 @@ from rigwatch.wire.host import (
     Kept,
     Pulse,
     free_share,
-    settle_memory,
+    keep_memory_tidy,
     use_few_pools,
 )
 from rigwatch.wire.messages import (
@@ -225,5 +225,5 @@ def run(path: Path | str, stop: threading.Event, notes: str = "") -> Path | None
     with joined(config, process_name(config), stop) as bus:
         if bus is None:
             return None
-        settle_memory()
+        keep_memory_tidy(stop)
         return record(config, describe_run(path, config, notes), bus, stop, Heartbeat(PROCESS))

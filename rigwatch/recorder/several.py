@@ -14,9 +14,9 @@ from rigwatch.wire.host import (
     Part,
     RigPulse,
     Work,
+    keep_memory_tidy,
     run_side_by_side,
     set_at_hangup,
-    settle_memory,
     use_few_pools,
 )
 from rigwatch.wire.rig_config import load_rig, rig_text
@@ -51,7 +51,7 @@ def run_several(paths: list[Path], stop: threading.Event, notes: str = "") -> li
     use_few_pools()
     folders: dict[Path, Path] = {}
     valid_rigs(paths)  # a wrong file is named by its rig's thread
-    settle_memory()
+    keep_memory_tidy(stop)
     links = SharedLinks(len(paths))
     parts = [
         Part(str(path), work_of(path, notes, folders, links), partial(used, path)) for path in paths

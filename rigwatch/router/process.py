@@ -10,7 +10,7 @@ from rigwatch.router.report import RouterReport
 from rigwatch.wire.access import REGISTER, access_settings
 from rigwatch.wire.bus import Close, open_router
 from rigwatch.wire.errors import BusError, KeysError
-from rigwatch.wire.host import Heartbeat, settle_memory, use_few_pools
+from rigwatch.wire.host import Heartbeat, keep_memory_tidy, use_few_pools
 from rigwatch.wire.rig_config import RigConfig
 
 TURN = 0.25
@@ -108,7 +108,7 @@ def _route(config: RigConfig, refusals: RefusalLog, stop: threading.Event) -> No
     router = FollowedRouter(config)
     if config.bus.security.keys:
         report.start()
-    settle_memory()
+    keep_memory_tidy(stop)
     heartbeat.ready(f"listens at {config.bus.listen}")
     # Samples do not pass through this loop.
     while not stop.wait(TURN):

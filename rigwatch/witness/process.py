@@ -20,7 +20,7 @@ from rigwatch.wire.bus import (
     serve_alarm_list,
 )
 from rigwatch.wire.errors import BusError
-from rigwatch.wire.host import Heartbeat, settle_memory, use_few_pools
+from rigwatch.wire.host import Heartbeat, keep_memory_tidy, use_few_pools
 from rigwatch.wire.messages import (
     ALARMS,
     COMMANDS,
@@ -196,7 +196,7 @@ def run(config: RigConfig, stop: threading.Event) -> None:
             lease=config.bus.lease,
         )
         heartbeat = Heartbeat(PROCESS)
-        settle_memory()
+        keep_memory_tidy(stop)
         heartbeat.ready()
         turns = 0
         while not stop.wait(TURN):

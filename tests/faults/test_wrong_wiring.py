@@ -1,12 +1,16 @@
 """Channels swapped and units wrong from the start, on a real line: told, and nothing is learnt."""
 
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from monitor.model import load_model, model_versions
+from tests.bus.rig import rigwatch
 from tests.faults.field import GAINS, RATE, Field, SerialDevice, WaveSource, least_of
+from tests.waiting import eventually
 
 pytestmark = pytest.mark.xdist_group("faults-supervised")
 
@@ -110,3 +114,45 @@ def test_15_a_drive_in_the_wrong_unit(tmp_path: Path) -> None:
         assert alarm.value > alarm.high == 5.0
         assert alarm.seq - first <= 2 * RATE, "two windows of motion"
         nothing_is_judged(field, boot, alarm.seq)
+
+
+def accepted(field: Field, name: str) -> "subprocess.CompletedProcess[str]":
+    path = str(field.rig.path)
+    return rigwatch("accept", path, name, "--user", "ann", "--text", "an amplifier of 4")
+
+
+@pytest.fixture
+def loud(tmp_path: Path) -> Iterator[tuple[Field, int]]:
+    yield from wired(tmp_path, AmplifiedSource(), {})
+
+
+def test_15_a_wiring_that_a_person_accepts_is_watched_also_after_a_kill(
+    loud: tuple[Field, int],
+) -> None:
+    field, boot = loud
+    field.raised("wiring_scale")
+    refused = accepted(field, "wiring_sign")
+    assert refused.returncode == 1
+    assert "found no alarm 'wiring_sign' of the wiring whose condition holds" in refused.stderr
+    assert all(block.column("armed").values.max() == 0.0 for block in field.estimates())
+
+    done = accepted(field, "wiring_scale")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("in force from sample ")
+    eventually(lambda: armed_after(field, boot, 0) > 0, "the rig is watched")
+    field.cleared("wiring_scale")
+    step = model_versions.history(field.folder / "model.toml")[-1]
+    assert (step.step, step.user, step.why) == ("accept", "ann", "an amplifier of 4")
+    assert load_model(field.folder / "model.toml").accepted_wiring == ("wiring_scale",)
+
+    field.kill("monitor")
+    since = max(block.seq for block in field.estimates())
+    field.start("monitor")
+    eventually(lambda: armed_after(field, boot, since + 512) > 0, "the next run watches it")
+    assert not field.journalled("wiring_scale")[-1].active
+
+
+def armed_after(field: Field, boot: int, seq: int) -> int:
+    """Samples from a number on that were used for a verdict."""
+    found = [block for block in field.estimates() if block.boot == boot and block.seq >= seq]
+    return int(sum(block.column("armed").values.sum() for block in found))

@@ -4,10 +4,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from msgspec import structs
 
-from monitor.model.model_file import RigModel
+from monitor.model.model_file import RigModel, model_text, parse_model
 from monitor.pipeline.rig_monitor import RigMonitor
 from monitor.wiring.motion_ratio import motion_ratio
+from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.messages.message_types import Alarm, EstimateBlock
 from rigwatch.wire.rig_config import AlarmSection
 from sim_plant.excitation import Chirp, Multisine, Shape, Sine, Square
@@ -199,3 +201,56 @@ def test_coarse_channels_in_motion_show_it() -> None:
     assert found is not None
     assert found.gain == pytest.approx(1.0, abs=0.05)
     assert found.phase == pytest.approx(0.0, abs=1.0)
+
+
+def accepting(model: RigModel, *names: str) -> RigModel:
+    return structs.replace(model, accepted_wiring=names)
+
+
+def four_times(c: Channels) -> None:
+    c["acceleration"] = 4.0 * c["acceleration"]
+
+
+def test_what_a_person_has_accepted_passes_and_nothing_else_does() -> None:
+    channels = run(SINE, 8.0)
+    four_times(channels)
+    times, estimates = watched(channels, accepting(monitor_rig.model(), "wiring_scale"))
+    assert not {name for name in times if name.startswith("wiring")}
+    assert estimates[0].column("armed").values.any()
+    times, _ = watched(channels, accepting(monitor_rig.model(), "wiring_sign", "wiring_swapped"))
+    assert times["wiring_scale"] <= 2.0
+    channels["voltage"] = -channels["voltage"]
+    times, estimates = watched(channels, accepting(monitor_rig.model(), "wiring_scale"))
+    assert times["wiring_drive"] <= 2.0
+    assert not any(block.column("armed").values.any() for block in estimates)
+
+
+@pytest.mark.parametrize("reversed_too", [False, True])
+def test_a_running_monitor_takes_the_word_from_the_next_sample_on(*, reversed_too: bool) -> None:
+    channels, model = run(SINE, 12.0), monitor_rig.model()
+    four_times(channels)
+    if reversed_too:
+        channels["voltage"] = -channels["voltage"]
+    monitor, at = RigMonitor(model), round(4.0 * RATE)
+    before = monitor.update(block(channels, 0, at))
+    assert before is not None
+    assert monitor.alarms.holds("wiring_scale")
+    monitor.adopt(accepting(model, "wiring_scale"))
+    first = monitor.update(block(channels, at, at + round(RATE) - 1))
+    after = monitor.update(block(channels, at + round(RATE) - 1, len(channels["voltage"])))
+    assert first is not None
+    assert after is not None
+    assert not before.estimates.column("armed").values.any()
+    assert not first.estimates.column("armed").values.any(), "in doubt until a window has passed"
+    assert not monitor.alarms.holds("wiring_scale")
+    assert monitor.alarms.holds("wiring_drive") == reversed_too
+    assert after.estimates.column("armed").values.any() != reversed_too
+
+
+def test_the_models_word_is_kept_in_its_file() -> None:
+    model = accepting(monitor_rig.model(), "wiring_swapped", "wiring_drive")
+    assert parse_model(model_text(model), "again") == model
+    assert "accepted_wiring" not in model_text(monitor_rig.model())
+    broken = model_text(model).replace("wiring_swapped", "wiring_any")
+    with pytest.raises(ConfigError, match="accepted_wiring"):
+        parse_model(broken, "broken")

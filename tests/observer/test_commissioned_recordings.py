@@ -172,6 +172,14 @@ def test_wrong_wiring_is_refused_unless_it_is_wanted(
     assert "s of recordings: this takes about" in capsys.readouterr().err  # the work begins
 
 
+def test_the_model_of_a_wiring_that_is_wanted_has_it_accepted(
+    runs: dict[str, Path], tmp_path: Path
+) -> None:
+    loud = {r: changed(p, tmp_path / f"{r}.mcap", ten_times) for r, p in runs.items()}
+    assert commission(loud, tmp_path / "model.toml", "--any-wiring") == 0
+    assert load_model(tmp_path / "model.toml").accepted_wiring == ("wiring_scale",)
+
+
 def test_the_model_before_is_kept_with_its_history(commissioned: tuple[Path, str]) -> None:
     output, said = commissioned
     assert "about" in said

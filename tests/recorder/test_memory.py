@@ -98,3 +98,55 @@ def test_what_start_up_made_is_not_looked_at_again(tmp_path: Path, begin: str) -
     settled, looked_at = map(int, said.stdout.split())
     assert settled > 10_000
     assert looked_at < settled / 10
+
+
+TUPLES_KEPT = """
+import sys, threading, time
+from pathlib import Path
+from rigwatch import recorder, router, witness
+from rigwatch.wire.host import few_pools
+from rigwatch.wire.rig_config import load_rig
+
+few_pools.TIDY_EVERY = 0.3
+stop = threading.Event()
+
+def watch():
+    while "tidying" not in {{one.name for one in threading.enumerate()}}:
+        time.sleep(0.05)
+    end, most = time.monotonic() + 45.0, 0
+    while most < 1500 and time.monotonic() < end:
+        made = [tuple([n] * 19) for n in range(2000)]
+        made.clear()
+        kept = sys.getallocatedblocks()
+        time.sleep(1.0)
+        most = max(most, kept - sys.getallocatedblocks())
+    print(most)
+    stop.set()
+
+threading.Thread(target=watch).start()
+{begin}
+time.sleep(1.0)
+print("tidying" in {{one.name for one in threading.enumerate()}})
+"""
+
+
+@pytest.mark.parametrize(
+    "begin",
+    [
+        "recorder.run(Path(sys.argv[1]), stop)",
+        "recorder.run_several([Path(sys.argv[1])], stop)",
+        "witness.run(load_rig(sys.argv[1]), stop)",
+        "router.run(load_rig(sys.argv[1]), stop)",
+    ],
+)
+def test_freed_tuples_are_not_kept_for_months(tmp_path: Path, begin: str) -> None:
+    with TestRig(tmp_path) as rig:
+        if "router" not in begin:
+            rig.router()
+        said = subprocess.run(
+            [sys.executable, "-c", TUPLES_KEPT.format(begin=begin), str(rig.path)],
+            cwd=tmp_path, check=True, timeout=90, capture_output=True, text=True,
+        )  # fmt: skip
+    let_go, still_there = said.stdout.split()
+    assert int(let_go) >= 1500
+    assert still_there == "False", "the thread ends with the process's work"

@@ -8,7 +8,7 @@ from rigwatch.commands.common import POSITIVE, print_result, say, whole
 from rigwatch.commands.processes.model_place import check_place, install_model
 
 if TYPE_CHECKING:
-    from monitor.model import RigModel
+    from monitor.model import RigModel, Wiring
     from monitor.signals import Recording, Role
 
 TRANSFER_S, EQUATIONS_S = (3.0, 3.0), (10.0, 65.0)
@@ -90,6 +90,9 @@ def run(arguments: argparse.Namespace) -> int:
     check_place(arguments.output)
     stated = _stated(arguments)
     recordings = _recordings(arguments)
+    accepted = _accepted_wiring(arguments, recordings)
+    from msgspec import structs
+
     from monitor.commissioning import CommissionSettings, commission_best
     from monitor.signals import commission_inertia
 
@@ -107,6 +110,7 @@ def run(arguments: argparse.Namespace) -> int:
         model = commission_best(
             recordings, settings, arguments.scheme, arguments.equations, say, stated=stated
         )
+    model = structs.replace(model, accepted_wiring=accepted)
     kept = install_model(arguments.output, model)
     if kept:
         say(f"the model before is {kept}")
@@ -145,15 +149,12 @@ def _recordings(arguments: argparse.Namespace) -> "list[Recording]":
         raise ModelError("--healthy: found no recording, expected at least one")
     needed = _needed(arguments)
     roles: tuple[Role, ...] = ("chirp", "healthy", "friction")
-    found = [
+    return [
         one
         for role in roles
         for path in getattr(arguments, role)
         for one in _read(role, path, needed)
     ]
-    for one in found:
-        _check_wiring(one, any_wiring=arguments.any_wiring)
-    return found
 
 
 def _needed(arguments: argparse.Namespace) -> set[str]:
@@ -176,16 +177,23 @@ def _read(role: "Role", path: Path, needed: set[str]) -> "list[Recording]":
     return recorded(role, path.name, session.samples(), rate, needed=needed, say=say)
 
 
-def _check_wiring(recording: "Recording", *, any_wiring: bool) -> None:
-    from monitor.wiring import check_recorded
+def _accepted_wiring(
+    arguments: argparse.Namespace, recordings: "list[Recording]"
+) -> "tuple[Wiring, ...]":
+    """What is wired wrongly and taken for right, as a monitor is to take it too.
+
+    Raises:
+        ModelError: something is, and nobody has said that it may be.
+    """
+    from monitor.wiring import recorded_wiring
     from rigwatch.wire.errors import ModelError
 
-    try:
-        check_recorded(recording)
-    except ModelError as error:
-        if not any_wiring:
-            raise ModelError(f"{error}; --any-wiring commissions it all the same") from None
-        say(str(error))
+    found = list(filter(None, map(recorded_wiring, recordings)))
+    if found and not arguments.any_wiring:
+        raise ModelError(f"{found[0][1]}; --any-wiring commissions it all the same")
+    for _, text in found:
+        say(text)
+    return tuple(dict.fromkeys(name for name, _ in found))
 
 
 def _say_how_long(recordings: "list[Recording]", scheme: str) -> None:

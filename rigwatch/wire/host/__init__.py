@@ -3,7 +3,7 @@
 from rigwatch.wire.host.both_clocks import both_clocks
 from rigwatch.wire.host.disk_space import free_share
 from rigwatch.wire.host.ending import set_at_hangup, set_at_signal
-from rigwatch.wire.host.few_pools import settle_memory, use_few_pools
+from rigwatch.wire.host.few_pools import keep_memory_tidy, settle_memory, use_few_pools
 from rigwatch.wire.host.heartbeat import WAITS, Heartbeat
 from rigwatch.wire.host.one_keeper import Hold, Kept
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
@@ -40,6 +40,7 @@ __all__ = [
     "free_ports",
     "free_share",
     "is_free",
+    "keep_memory_tidy",
     "last_line",
     "prepare_for_real_time",
     "raise_priority",

@@ -9,14 +9,15 @@ class ModelRequest:
     """A model-change request.
 
     Attributes:
-        action: "promote" this model, or "rollback" to the previous version.
-        model: the model file's text; empty for a rollback.
+        action: "promote" this model, "rollback" to the previous version, or "accept" a wiring that
+            does not pass.
+        model: the model file's text; for "accept" the alarm's name; empty for a rollback.
         user: who makes the request.
         text: the reason.
         proof: the operator's signature, or without keys that of the account.
     """
 
-    action: Literal["promote", "rollback"]
+    action: Literal["promote", "rollback", "accept"]
     model: str
     user: str
     text: str
