@@ -54,6 +54,26 @@ def test_what_no_output_shows_and_nothing_uses_is_reported() -> None:
     assert found.start == ("x", "a", "b")
 
 
+CYLINDER = """
+name = "cylinder"
+summary = "A piston moved by oil, of which only the position is read."
+inputs.flow = { unit = "m^3/s" }
+parameters.A = { value = 6e-4, unit = "m^2" }
+parameters.m = { value = 28.0, unit = "kg" }
+parameters.b = { value = 500.0, unit = "N s/m" }
+parameters.Cp = { value = 1e-13, unit = "m^3/Pa" }
+states.x = { unit = "m", derivative = "v", measured = "position" }
+states.v = { unit = "m/s", derivative = "(A*p - b*v)/m", rate_of = "position" }
+states.p = { unit = "Pa", derivative = "(flow - A*v)/Cp" }
+states.oil = { unit = "m^3", derivative = "flow" }
+outputs.position = { unit = "mm", expression = "x" }
+"""
+
+
+def test_a_pressure_in_pascal_is_seen_in_a_position_and_what_it_does_not_move_is_not() -> None:
+    assert model_report(parse(CYLINDER, Model, "cylinder"), {}).unseen == ("oil",)
+
+
 NEVER_NEGATIVE = ("kg", "kg m^2", "m^2", "m^3", "ohm", "H", "J/K")
 """Units of masses, inertias, areas, volumes, resistances, inductances and heat capacities."""
 

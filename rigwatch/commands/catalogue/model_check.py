@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigwatch.commands.catalogue.curves import plot_lines, save_curves
-from rigwatch.commands.common import check_folder, print_result
+from rigwatch.commands.common import check_folder, named_values, print_result
 
 if TYPE_CHECKING:
     from rigwatch.workbench.catalogue import ModelReport
@@ -34,23 +34,13 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.workbench.catalogue import model_report
 
     check_folder(arguments.save)
-    inputs = dict(map(_value, arguments.input))
+    inputs = named_values("--input", arguments.input, "u=2.5")
     report = model_report(model_named(arguments.model), inputs, arguments.model)
     lines = [*_lines(arguments.model, report), *plot_lines(report.run)]
     print_result(arguments, _plain(report), lines)
     if arguments.save:
         save_curves(arguments.save, report.run, lambda curve: f"{arguments.model}: {curve.up}")
     return 0 if report.fine else 1
-
-
-def _value(text: str) -> tuple[str, float]:
-    from rigwatch.wire.errors import ModelError
-
-    name, _, number = text.partition("=")
-    try:
-        return name, float(number)
-    except ValueError:
-        raise ModelError(f"--input: found {text!r}, expected a NAME=VALUE such as u=2.5") from None
 
 
 def _lines(name: str, report: "ModelReport") -> list[str]:

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigwatch.commands.common import POSITIVE, print_result, say, whole
+from rigwatch.commands.common import POSITIVE, named_values, print_result, say, whole
 from rigwatch.commands.processes.model_place import check_place, install_model
 
 if TYPE_CHECKING:
@@ -132,13 +132,7 @@ def _stated(arguments: argparse.Namespace) -> dict[str, float]:
         return {}
     if arguments.scheme == "transfer" or arguments.plant == "inertia":
         raise ModelError("--set: found no model of equations, expected --scheme equations or auto")
-    stated = {}
-    for text in arguments.set:
-        name, _, value = (part.strip() for part in text.partition("="))
-        try:
-            stated[name] = float(value)
-        except ValueError:
-            raise ModelError(f"--set: found {text!r}, expected NAME=VALUE such as m=0.31") from None
+    stated = named_values("--set", arguments.set, "m=0.31")
     return stated_in_si(arguments.equations, stated)
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import sympy
+from scipy.linalg import matrix_balance
 
 from rigwatch.physics.engine.compile import compile_system
 from rigwatch.physics.engine.equations import (
@@ -172,7 +173,10 @@ def _unbounded(model: Model) -> tuple[str, ...]:
 
 
 def _run(system: System, inputs: Mapping[str, float]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Time (n,), outputs (n, outputs), their derivatives by initial states (n·outputs, states)."""
+    """Time (n,), outputs (n, outputs), their derivatives by initial states (n·outputs, states).
+
+    The derivatives are free of units.
+    """
     compiled = compile_system(system)
     first = np.array([[state.start for state in system.states.values()]])
     values = np.array([[inputs[name] for name in system.model.inputs]])
@@ -181,13 +185,33 @@ def _run(system: System, inputs: Mapping[str, float]) -> tuple[FloatArray, Float
         np.repeat(values, 2, 0), 1e-9, at, 2, initial=first, parameters=parameters, substeps=1
     )
     free, states = len(system.free), len(system.states)
-    rates = np.linalg.eigvals(np.nan_to_num(there.rate_slopes[0, 0, :, free : free + states]))
-    dt, count = _grid(np.abs(rates))
+    by_states = np.nan_to_num(there.rate_slopes[0, 0, :, free : free + states])
+    dt, count = _grid(np.abs(np.linalg.eigvals(by_states)))
     made = compiled.simulate(
         np.repeat(values, count, 0), dt, at, count, initial=first, parameters=parameters
     )
-    slopes = made.slopes[0, :, :, free : free + states].reshape(-1, states)
+    slopes = _without_units(made.slopes[0, :, :, free : free + states], by_states)
     return np.arange(count, dtype=np.float64) * dt, made.outputs[0], slopes
+
+
+def _without_units(slopes: FloatArray, by_states: FloatArray) -> FloatArray:
+    """Derivatives of the outputs that no longer depend on the units of states and outputs.
+
+    A pressure in Pa moves a position in m by 1e-9 times what a speed does, and is seen all the
+    same. States are scaled as balancing the linear model scales them (E. E. Osborne, J. ACM 7(4),
+    1960), outputs by their largest derivative.
+
+    Args:
+        slopes: shape (n, outputs, states).
+        by_states: derivatives of the states' rates by the states, shape (states, states).
+
+    Returns:
+        Shape (n·outputs, states).
+    """
+    _, scales = matrix_balance(by_states, permute=False, separate=True)
+    scaled = slopes * scales[0]
+    largest = np.max(np.abs(scaled), axis=(0, 2), keepdims=True)
+    return np.asarray(scaled / np.maximum(largest, 1e-300)).reshape(-1, slopes.shape[-1])
 
 
 def _grid(rates: FloatArray) -> tuple[float, int]:

@@ -29,6 +29,7 @@ from rigwatch.physics.engine.search import (
     Convergence,
     ShortHorizons,
     WholeRuns,
+    at_other_values,
     continued_spread,
     convergence,
     fit_continued,
@@ -253,8 +254,9 @@ def _trained(  # noqa: PLR0917 -- the arguments of `fit_model`
             continued=not study.model.rough,
         )  # fmt: skip
     if search:
-        found, ended = multi_start_fit(search)
-        return _settled(study, data, found, horizon, substeps), ended, horizon
+        best, ended = multi_start_fit(search)
+        found = _settled(study, data, best, horizon, substeps)
+        return found, ended if found is best else at_other_values(ended, found), horizon
     free_run = study.model.states and not data.along_motion
     if free_run and (horizon >= LONG or from_short_horizons):
         begin = fit_over(horizon // SHORTER, start=begin).parameters

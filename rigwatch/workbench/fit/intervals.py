@@ -228,10 +228,13 @@ def identifiability(fitted: Fit) -> dict[str, str]:
         return {}
     jacobian = fitted.jacobian.reshape(-1, m)
     sizes = np.linalg.norm(jacobian, axis=0)
+    # What a change by its own size does, as parameters have units of their own.
+    values, declared = fitted.values(), fitted.compiled.system.parameters
+    own = np.array([max(abs(values[n]), abs(declared[n].value)) or 1.0 for n in names])
     notes = {
         name: "has no influence on this recording"
-        for name, size in zip(names, sizes, strict=True)
-        if size < 1e-12 * max(sizes.max(initial=0.0), 1e-300)
+        for name, size in zip(names, own * sizes, strict=True)
+        if size < 1e-12 * max((own * sizes).max(initial=0.0), 1e-300)
     }
     unit = jacobian / np.where(sizes > 0, sizes, 1.0)
     together = np.linalg.pinv(unit.T @ unit, rcond=1e-14)

@@ -1,7 +1,7 @@
 """Matches columns of a log to a model's signals: by name, otherwise by the only matching unit."""
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
@@ -79,14 +79,10 @@ def suggested(columns: Sequence[str], model: Model) -> dict[str, str]:
     time = _time_of(headers, (), model, counted=False)
     free, found = [h for h in headers if h is not time], dict[str, str]()
     signals: dict[str, Input | Output] = {**model.inputs, **model.outputs}
-    for name, signal in signals.items():
-        channel = signal.channel or name
-        column = _column(name, channel, signal, free)
-        if column is None:
-            continue
-        free.remove(column)
+    for name, column in _chosen(signals, free):
+        channel = signals[name].channel or name
         with suppress(ModelError):
-            found[channel] = f"{column.column}[{_unit(column, channel, signal)[0]}]"
+            found[channel] = f"{column.column}[{_unit(column, channel, signals[name])[0]}]"
     return found
 
 
@@ -104,18 +100,21 @@ def _read(
         headers: of all columns.
         free: those that no signal has yet; the ones taken are removed.
     """
-    found, missing, remarks = dict(given), list[str](), list[str]()
+    found, remarks = dict(given), list[str]()
+    missing = list[str]()
     for name, signal in signals.items():
         channel = signal.channel or name
         if channel in found:
             found[channel], told = _given(found[channel], channel, signal, headers)
-        elif column := _column(name, channel, signal, free):
-            unit, told = _unit(column, channel, signal)
-            found[channel] = f"{column.column}[{unit}]"
-            free.remove(column)
+            remarks += told
         else:
             missing.append(name)
-            continue
+    for name, column in _chosen({name: signals[name] for name in missing}, free):
+        signal = signals[name]
+        channel = signal.channel or name
+        unit, told = _unit(column, channel, signal)
+        found[channel] = f"{column.column}[{unit}]"
+        missing.remove(name)
         remarks += told
     return found, missing, remarks
 
@@ -168,19 +167,42 @@ def _time_unit(time: Header) -> str:
     return time.units[0] if time.units else "s"
 
 
-def _column(
+def _chosen(
+    signals: Mapping[str, Input | Output], free: list[Header]
+) -> Iterator[tuple[str, Header]]:
+    """Signals and their columns: all by name first, so that the only unit left tells the others.
+
+    Args:
+        signals: to be found, by name.
+        free: columns that no signal has yet; the ones taken are removed.
+    """
+    missing = list(signals)
+    for choose in (_named, _measured):
+        for name in tuple(missing):
+            signal = signals[name]
+            if column := choose(name, signal.channel or name, signal, free):
+                free.remove(column)
+                missing.remove(name)
+                yield name, column
+
+
+def _named(
     name: str, channel: str, signal: Input | Output, headers: Sequence[Header]
 ) -> Header | None:
-    """The column of a signal: by name, otherwise the only one with a matching unit."""
+    """The column of a signal by name, or by a part of it."""
     suiting = [header for header in headers if not header.units or _fits(header, signal)]
     wanted = {name.lower(), channel.lower()}
     named = [header for header in suiting if header.name in wanted]
     alike = [h for h in suiting if any(_within(word, h.name) for word in wanted)]
-    measured = [header for header in suiting if header.units]
-    for chosen in (named, alike, measured):
-        if len(chosen) == 1:
-            return chosen[0]
-    return None
+    return next((chosen[0] for chosen in (named, alike) if len(chosen) == 1), None)
+
+
+def _measured(
+    _name: str, _channel: str, signal: Input | Output, headers: Sequence[Header]
+) -> Header | None:
+    """The column of a signal if it is the only one with a matching unit that no name took."""
+    suiting = [header for header in headers if header.units and _fits(header, signal)]
+    return suiting[0] if len(suiting) == 1 else None
 
 
 def _within(word: str, name: str) -> bool:
@@ -258,8 +280,10 @@ def _rate(signal: Input | Output, measured: Mapping[str, Input | Output]) -> tup
 
 
 def _unknown(name: str, channel: str, signal: Input | Output, columns: Sequence[str]) -> str:
+    suiting = [c for c in columns if (h := read_header(c)).units and _fits(h, signal)]
     unit = signal.shown or signal.unit
+    options = [f"--map '{channel}={column}'" for column in suiting]
     return (
         f"found no unique column for {name} [{unit}] among {', '.join(columns)};"
-        f" expected --map {channel}=COLUMN[{unit}]"
+        f" expected {' or '.join(options) or f'--map {channel}=COLUMN[{unit}]'}"
     )

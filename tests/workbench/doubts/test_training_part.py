@@ -29,20 +29,26 @@ parameters.b = { value = 0.01, unit = "N m s/rad", low = 0.0 }
 outputs.speed = { unit = "rad/s", expression = "w" }
 ports.shaft = { kind = "force", unit = "N m", variables.v = { expression = "w", unit = "rad/s" } }
 """
+UNSEEN = ROTOR.replace("(torque", "(coupling").replace(
+    'parameters.b', 'states.coupling = { unit = "N m", derivative = "(torque - coupling)/tau" }\n'
+    'parameters.tau = { value = 0.2, unit = "s", low = 0.02 }\nparameters.b'
+)  # fmt: skip
+"""Its torque comes through a coupling whose own torque no channel shows."""
 UNITS = {"torque": "N m", "speed": "rad/s"}
 J, B, COULOMB, DT, FINER = 0.03, 0.02, 0.05, 0.01, 20
 
 
-def log(seconds: float, seed: int) -> Table:
+def log(seconds: float, seed: int, tau: float = 0.0) -> Table:
     """A rotor with Coulomb friction that stops it exactly, in small Euler steps."""
     generator = np.random.default_rng(seed)
     count = round(seconds / DT)
     torque = np.repeat(generator.uniform(-0.4, 0.4, count // 25 + 1), 25)[:count]
-    speed, w = np.empty(count), 0.0
+    speed, w, driven = np.empty(count), 0.0, 0.0
     for k in range(count):
         speed[k] = w
         for _ in range(FINER):
-            free = w + DT / FINER * (torque[k] - B * w) / J
+            driven += DT / FINER * (torque[k] - driven) / tau if tau else torque[k] - driven
+            free = w + DT / FINER * (driven - B * w) / J
             w = np.sign(free) * max(abs(free) - DT / FINER * COULOMB / J, 0.0)
     return {"torque": torque, "speed": speed + 0.01 * generator.standard_normal(count)}
 
@@ -105,3 +111,15 @@ def test_an_effect_fits_the_part_as_it_does_the_whole(bench: Bench, part: Traini
     whole = row.fitted.train.values()
     assert starts == pytest.approx(whole, rel=0.05)
     assert starts[row.placement.prefix + "Fc"] == pytest.approx(COULOMB, rel=0.05)
+
+
+def test_hidden_states_that_run_on_are_taken_on_the_part_as_well(tmp_path: Path) -> None:
+    train = [log(length, seed, 0.1) for seed, length in enumerate((60, 25))]
+    study = studied(tmp_path, UNSEEN, train, [log(20, 9, 0.1)], UNITS, "horizon = 0.5")
+    bench = open_bench(study)
+    assert bench.base.train.continued
+    part = part_of(bench)
+    assert part is not None
+    own = part.of(bench.base)
+    rows = scored(bench.study, part.data, own, candidates(bench.study, bench.data.train))
+    assert min(rows, key=lambda row: row.p_value).effect == "coulomb"

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from rigwatch.commands import main
+from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data.signals import prepare
+from rigwatch.workbench.steps.log_columns import matched
 from rigwatch.workbench.study.ledger import append
 from rigwatch.workbench.study.study import open_study
 from rigwatch.workbench.study.told_units import told_unit
@@ -102,3 +104,19 @@ def test_a_time_in_something_that_is_no_unit_is_asked_for(tmp_path, run, capsys)
     assert main(new) == 2
     assert "expected --time 'time [ticks][s]'" in capsys.readouterr().err
     assert main([*new, "--time", "time [ticks][s]"]) == 0
+
+
+BLOCK = shipped_models()["heated-block"]
+
+
+def test_a_column_that_no_name_takes_is_told_by_its_unit():
+    columns = ["time [s]", "Air [degC]", "Power [W]", "Block temperature [degC]"]
+    found = matched(columns, BLOCK, {}).channels
+    own = {"power": "Power [W]", "temperature": "Block temperature [degC]", "ambient": "Air [degC]"}
+    assert {name: column.rsplit("[", 1)[0] for name, column in found.items()} == own
+
+
+def test_of_two_columns_that_suit_the_options_are_told_with_their_own_units():
+    columns = ["time [s]", "Air [degC]", "Base [degF]", "Power [W]", "Block temperature [degC]"]
+    with pytest.raises(ModelError, match=r"--map 'ambient=Air \[degC\]' or --map 'ambient=Base"):
+        matched(columns, BLOCK, {})

@@ -27,9 +27,13 @@ from rigwatch.physics.engine.fit.recording import (
 )
 from rigwatch.physics.engine.fit.ties import untied
 from rigwatch.physics.engine.fit.windowed_fit import (
+    CLOSE,
+    FAR,
     Fit,
     Prior,
     bounds,
+    covariance_of,
+    deviations,
     error_at,
     evaluate,
     fit,
@@ -37,7 +41,9 @@ from rigwatch.physics.engine.fit.windowed_fit import (
 )
 
 __all__ = [
+    "CLOSE",
     "ENOUGH",
+    "FAR",
     "EffectStates",
     "Fit",
     "Prior",
@@ -49,6 +55,8 @@ __all__ = [
     "Thinning",
     "beginning",
     "bounds",
+    "covariance_of",
+    "deviations",
     "error_at",
     "evaluate",
     "filled",

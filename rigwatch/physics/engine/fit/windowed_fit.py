@@ -179,7 +179,7 @@ def _smallest_error(
     standard deviations small.
     """
     low, high = within
-    unit = _deviations(*problem.projected(problem.whole(begin, theta)), theta)
+    unit = deviations(*problem.projected(problem.whole(begin, theta)), theta)
 
     def parameters(moved: FloatArray) -> FloatArray:
         return problem.whole(begin, np.clip(theta + unit * (moved - FAR), low, high))
@@ -213,7 +213,7 @@ def _smallest_error(
     return np.asarray(parameters(found.x)[problem.free])
 
 
-def _deviations(residual: FloatArray, jacobian: FloatArray, theta: FloatArray) -> FloatArray:
+def deviations(residual: FloatArray, jacobian: FloatArray, theta: FloatArray) -> FloatArray:
     """Each parameter's standard deviation given the others.
 
     Its size if it has no influence, or if nothing is left to explain.
@@ -288,6 +288,21 @@ def bounds(system: System) -> tuple[FloatArray, FloatArray]:
     return np.array([p.low for p in free]), np.array([p.high for p in free])
 
 
+def covariance_of(jacobian: FloatArray, variance: float) -> FloatArray:
+    """Covariance of the free parameters, shape (m, m), whatever the units that they are in.
+
+    Without equal columns a parameter of 1e3 beside one of 1e-13 would count as undetermined.
+
+    Args:
+        jacobian: of the residuals, shape (residuals, m).
+        variance: of a residual.
+    """
+    size = np.linalg.norm(jacobian, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    unit = jacobian / size
+    return np.asarray(np.linalg.pinv(unit.T @ unit) * variance / np.outer(size, size))
+
+
 def result_of(problem: Problem, found: Started) -> Fit:
     """The fit at the parameters found."""
     error, scale = found.error, problem.scale
@@ -301,8 +316,7 @@ def result_of(problem: Problem, found: Started) -> Fit:
     outputs, m = problem.measured.shape[2], len(problem.free)
     counted = problem.whole_recording(error.reshape(len(error), -1, outputs))
     used = counted.size - found.initial.size - m
-    variance = float(residual @ residual) / max(used, 1)
-    covariance = np.asarray(np.linalg.pinv(curvature) * variance, np.float64)
+    covariance = covariance_of(jacobian, float(residual @ residual) / max(used, 1))
     left = counted * scale
     if problem.recording.thinning is None:
         left = np.where(np.isnan(problem.whole_recording(problem.measured)), np.nan, left)

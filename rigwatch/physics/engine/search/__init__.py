@@ -4,7 +4,11 @@ search (ShortHorizons, WholeRuns) ──attempts──▶ multi_start_fit ──
 """
 
 from rigwatch.physics.engine.search.continued_fit import fit_continued
-from rigwatch.physics.engine.search.convergence import Convergence, convergence
+from rigwatch.physics.engine.search.convergence import (
+    Convergence,
+    at_other_values,
+    convergence,
+)
 from rigwatch.physics.engine.search.hidden_states import continued_spread, has_hidden_states
 from rigwatch.physics.engine.search.multi_start_fit import multi_start_fit
 from rigwatch.physics.engine.search.promised_step import kept_promise
@@ -15,6 +19,7 @@ __all__ = [
     "Convergence",
     "ShortHorizons",
     "WholeRuns",
+    "at_other_values",
     "continued_spread",
     "convergence",
     "fit_continued",

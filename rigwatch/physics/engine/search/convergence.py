@@ -9,7 +9,7 @@ which is independent of units and of the size of the error.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -92,6 +92,11 @@ def convergence(
         begun,
         reason or _agreed(agreeing, len(others) + 1, near_noise=near_noise),
     )
+
+
+def at_other_values(ended: Convergence, fitted: Fit) -> Convergence:
+    """How a search ended, told of the parameters to which its ties were resolved."""
+    return replace(ended, undetermined=_undetermined(fitted), at_bound=at_bound(fitted))
 
 
 def _agreed(agreeing: int, starts: int, *, near_noise: bool) -> str:

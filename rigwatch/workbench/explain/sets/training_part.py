@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from rigwatch.physics.engine.fit import Recording, windows
+from rigwatch.physics.engine.fit import Fit, Recording, windows
 from rigwatch.wire.arrays import IntArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
@@ -43,12 +43,16 @@ class TrainingPart:
 
     def of(self, fitted: Fitted) -> Fitted:
         """A fit to the whole training, as seen on the part."""
-        own, rows = fitted.train, self.windows
-        train = replace(
+        return replace(fitted, train=self._of_fit(fitted.train))
+
+    def _of_fit(self, own: Fit) -> Fit:
+        """A fit, and the one before it in which hidden states begin anew, on the part."""
+        rows, anew = self.windows, own.begun_anew
+        return replace(
             own, initial=own.initial[rows], residuals=own.residuals[rows],
             error=own.error[rows], jacobian=own.jacobian[rows],
+            begun_anew=self._of_fit(anew) if anew else None,
         )  # fmt: skip
-        return replace(fitted, train=train)
 
     def error(self, fitted: Fitted) -> float:
         """Error on the part of a fit to the whole, with states of effects continued."""
