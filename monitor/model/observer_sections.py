@@ -21,13 +21,7 @@ class EquationsPlant(Section, frozen=True, kw_only=True, tag="equations", tag_fi
         float, Meta(gt=0, description="speed over which the sign of the motion changes [m/s]")
     ] = 1e-3
     half_width: Annotated[
-        int,
-        Meta(
-            ge=2,
-            le=32,
-            description="lag of the smoothed motion [samples]; four samples before an instant "
-            "smooth it as well, or as many as the lag if that is longer",
-        ),
+        int, Meta(ge=2, le=32, description="lag of the smoothed motion [samples]")
     ] = 4
     late: Annotated[
         float,

@@ -22,7 +22,7 @@ from monitor.observer.decision_state import (
     DecisionRules,
     new_state,
 )
-from monitor.observer.lagged_motion import BACK, EMPTY, MATCHED, motion_kernel
+from monitor.observer.lagged_motion import EMPTY, MATCHED, motion_kernel
 from monitor.observer.missing_force import (
     DISAGREE,
     DRY_UNIT,
@@ -58,7 +58,6 @@ from monitor.observer.spectral_width import SpectralWidth, Spectrum
 from monitor.observer.usual_error import Extremes, UsualError, steady_motion
 
 __all__ = [
-    "BACK",
     "DEVIATIONS",
     "DISAGREE",
     "DRY_UNIT",
