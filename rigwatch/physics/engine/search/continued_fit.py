@@ -44,6 +44,8 @@ from rigwatch.wire.errors import ModelError
 
 CONVERGED = 1e-6
 """Relative fall of the squared error at which a fit ends."""
+NEGLIGIBLE = 1e-8
+"""Change of the error by an unknown's own size, relative to the error, below which it is kept."""
 MOST = 30
 """Most evaluations of a fit."""
 
@@ -173,10 +175,14 @@ class _ContinuedWindows:
         begin = np.clip(begin, low, high)
         here = self._path(begin)
         assert here is not None
-        unit = deviations(here.residual.ravel(), here.jacobian.reshape(size, -1), begin)
+        residual, jacobian = here.residual.ravel(), here.jacobian.reshape(size, -1)
+        unit = deviations(residual, jacobian, begin)
+        # What has no influence, as a capacity that windows apart made infinite, stays.
+        told = np.linalg.norm(jacobian, axis=0) * np.abs(begin)
+        steps = unit * ((begin == 0) | (told > NEGLIGIBLE * np.linalg.norm(residual)))
 
         def unknowns(moved: FloatArray) -> FloatArray:
-            return np.clip(begin + unit * (moved - FAR), low, high)
+            return np.clip(begin + steps * (moved - FAR), low, high)
 
         def residuals(moved: FloatArray) -> FloatArray:
             q = unknowns(moved)
@@ -186,12 +192,12 @@ class _ContinuedWindows:
 
         def slopes(moved: FloatArray) -> FloatArray:
             path = self._path(unknowns(moved))
-            own = np.zeros((size, len(unit))) if path is None else path.jacobian.reshape(size, -1)
+            own = np.zeros((size, len(steps))) if path is None else path.jacobian.reshape(size, -1)
             if prior is not None:
-                weak = np.zeros((len(prior.slopes), len(unit)))
+                weak = np.zeros((len(prior.slopes), len(steps)))
                 weak[:, : self._m] = prior.slopes
                 own = np.vstack([own, weak])
-            return own * unit
+            return own * steps
 
         try:
             found = scipy.optimize.least_squares(
