@@ -26,13 +26,10 @@ from rigwatch.physics.engine.fit.recording import (
 )
 from rigwatch.physics.engine.fit.ties import untied
 from rigwatch.physics.engine.fit.windowed_fit import (
-    CLOSE,
-    FAR,
     Fit,
     Prior,
     bounds,
     covariance_of,
-    deviations,
     error_at,
     evaluate,
     fit,
@@ -40,9 +37,7 @@ from rigwatch.physics.engine.fit.windowed_fit import (
 )
 
 __all__ = [
-    "CLOSE",
     "ENOUGH",
-    "FAR",
     "EffectStates",
     "Fit",
     "Prior",
@@ -55,7 +50,6 @@ __all__ = [
     "beginning",
     "bounds",
     "covariance_of",
-    "deviations",
     "error_at",
     "evaluate",
     "filled",
