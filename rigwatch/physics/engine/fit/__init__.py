@@ -27,13 +27,10 @@ from rigwatch.physics.engine.fit.recording import (
 )
 from rigwatch.physics.engine.fit.ties import untied
 from rigwatch.physics.engine.fit.windowed_fit import (
-    CLOSE,
-    FAR,
     Fit,
     Prior,
     bounds,
     covariance_of,
-    deviations,
     error_at,
     evaluate,
     fit,
@@ -41,9 +38,7 @@ from rigwatch.physics.engine.fit.windowed_fit import (
 )
 
 __all__ = [
-    "CLOSE",
     "ENOUGH",
-    "FAR",
     "EffectStates",
     "Fit",
     "Prior",
@@ -56,7 +51,6 @@ __all__ = [
     "beginning",
     "bounds",
     "covariance_of",
-    "deviations",
     "error_at",
     "evaluate",
     "filled",
