@@ -237,8 +237,8 @@ def with_change_told(study: Study, found: Verdict) -> Verdict:
     named = sorted(labels & {*found.members})
     told = [CHANGE.format(label=named[0])] if named else []
     fitted = found.best.fitted if found.best is not None else None
-    if fitted is not None and fitted.placements[-1].beyond:
-        told.append(BEYOND.format(element=fitted.placements[-1].beyond))
+    placed = fitted.placements[-1:] if fitted is not None else ()
+    told += [BEYOND.format(element=last.beyond) for last in placed if last.beyond]
     return replace(found, text="; ".join([found.text, *told]))
 
 
