@@ -24,7 +24,7 @@ each interval's share; of edges and of held voltages, that of one read early or 
 
 
 class Steps(NamedTuple):
-    """An input at the samples `lag` before those given, each of shape (n,).
+    """An input at the samples `half_width` before those given, each of shape (n,).
 
     Attributes:
         mean: its mean until the next sample; 0 with too few samples.
@@ -46,17 +46,17 @@ class InputSteps:
     """Follows one input, block by block.
 
     Args:
-        lag: of the results [samples].
+        half_width: lag of the results [samples].
         jitters: whether steps that seem to jitter are known to do so.
     """
 
-    def __init__(self, lag: int, jitters: bool = False) -> None:
+    def __init__(self, half_width: int, jitters: bool = False) -> None:
         self._jitters = jitters
-        self._sliding = SlidingSteps(lag)
-        self._jittered = JitteredSteps(lag)
+        self._sliding = SlidingSteps(half_width)
+        self._jittered = JitteredSteps(half_width)
         self._edges = JitteredEdges()
         self._held = HeldReadings()
-        self._regular = SlidingEdges(lag)
+        self._regular = SlidingEdges(half_width)
 
     def update(self, signal: FloatArray, code: Codes) -> Steps:
         """The next samples of the input, shape (n,), with states of the admission."""

@@ -22,7 +22,7 @@ from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kernel import kernel, part
 
 HALF = 4
-"""Half the length of a window [readings]."""
+"""Readings on either side of a window's middle."""
 ROUGH, EDGE = 0.03, 0.6
 """Energy that no curve fits, relative to the mean square of the steps, above which a window may
 hold old readings; and share of one step in the energy of all, above which it holds an edge.
@@ -44,7 +44,7 @@ REMEMBERED = 1024.0
 
 
 class Jittered(NamedTuple):
-    """An input at the samples `lag` before those given, both of shape (n,).
+    """An input at the samples `half_width` before those given, both of shape (n,).
 
     Attributes:
         value: the voltage in force until the next sample, where the steps jitter.
@@ -61,14 +61,14 @@ class JitteredSteps:
     """Follows one input, block by block.
 
     Args:
-        lag: of the results [samples]; with a short one fewer windows tell the age of a reading.
+        half_width: lag of the results [samples].
     """
 
-    def __init__(self, lag: int) -> None:
-        later = min(lag, HALF)
-        self._ages = assumptions(HALF, later)
-        self._ring = np.zeros(lag + 2 * HALF - later)
-        self._gains = np.zeros((2, later + 1))
+    def __init__(self, half_width: int) -> None:
+        half = min(half_width, HALF)
+        self._ages = assumptions(half)
+        self._ring = np.zeros(half_width + half)
+        self._gains = np.zeros((2, half + 1))
         self._kept = np.zeros(len(_AT))
 
     def update(self, signal: FloatArray, code: Codes) -> Jittered:
@@ -135,8 +135,8 @@ def _advance(  # noqa: PLR0917 -- a kernel
 
 @part()
 def _in_force(ages: Ages, window: FloatArray, gains: FloatArray, kept: FloatArray) -> float:
-    """The voltage in force at a window's instant; the window is the last to say its age."""
-    now = window.size - gains.shape[1]
+    """The voltage in force in the middle of a window, which is the last to say its age."""
+    now = window.size // 2 - 1
     steps, largest = 0.0, 0.0
     for i in range(window.size - 1):
         step = (window[i + 1] - window[i]) ** 2
@@ -173,9 +173,9 @@ def _weigh(ages: Ages, window: FloatArray, rough: float, gains: FloatArray) -> t
 
     Returns:
         Whether only one with old and new readings in turn fits, and not one that changes once, as
-        where steps slide; and the best one in which the reading at the instant is old.
+        where steps slide; and the best one in which the middle reading is old.
     """
-    now = window.size - gains.shape[1]
+    now = window.size // 2 - 1
     least = np.empty((2, window.size))
     fill_rows(least, np.inf)
     once, chosen = np.inf, ages.old.shape[0] - 1

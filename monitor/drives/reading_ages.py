@@ -22,7 +22,7 @@ class Ages(NamedTuple):
         old: 1 for an old reading, shape (assumptions, 2·half); the first has none.
         changes: how often old and new change, shape (assumptions,).
         misfits: projections onto what no curve fits, (assumptions, 2·half - DEGREE - 1, 2·half).
-        values: weights of the readings in the voltage in force at one instant, shape as `old`.
+        values: weights of the readings in the voltage in force in the middle, shape as `old`.
     """
 
     old: NDArray[np.int64]
@@ -31,21 +31,20 @@ class Ages(NamedTuple):
     values: FloatArray
 
 
-def assumptions(half: int, later: int) -> Ages:
-    """All assumptions for a window of 2·half readings, the last `later` after its instant."""
+def assumptions(half: int) -> Ages:
+    """All assumptions for a window of 2·half readings."""
     size = 2 * half
     old = (np.arange(2**size)[:, None] >> np.arange(size)) & 1
-    shapes = [_shape(each, half, later) for each in old]
+    shapes = [_shape(each, half) for each in old]
     misfits, values = (np.ascontiguousarray(np.stack(part)) for part in zip(*shapes, strict=True))
     return Ages(old, np.abs(np.diff(old, axis=1)).sum(axis=1), misfits, values)
 
 
-def _shape(old: NDArray[np.int64], half: int, later: int) -> tuple[FloatArray, FloatArray]:
+def _shape(old: NDArray[np.int64], half: int) -> tuple[FloatArray, FloatArray]:
     """Projection and weights for one assumption."""
     powers = np.vander((np.arange(old.size) - old) / half - 1.0, DEGREE + 1)
     rotated, _ = np.linalg.qr(powers, mode="complete")
-    at = (old.size - 1 - later) / half - 1.0
-    weights = np.vander([at], DEGREE + 1) @ np.linalg.pinv(powers)
+    weights = np.vander([-1.0 / half], DEGREE + 1) @ np.linalg.pinv(powers)
     return rotated[:, DEGREE + 1 :].T, weights[0]
 
 

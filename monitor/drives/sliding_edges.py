@@ -39,7 +39,7 @@ LONGEST = 4.0
 
 
 class Moved(NamedTuple):
-    """An input at the samples `lag` before those given, each of shape (n,).
+    """An input at the samples `half_width` before those given, each of shape (n,).
 
     Attributes:
         held: the samples themselves.
@@ -58,14 +58,14 @@ class SlidingEdges:
     """Follows one input, block by block.
 
     Args:
-        lag: of the results [samples].
+        half_width: lag of the results [samples].
     """
 
-    def __init__(self, lag: int) -> None:
+    def __init__(self, half_width: int) -> None:
         self._edges = np.zeros((2, COUNT))
         self._ways = np.zeros((2, len(_OWN)))
         self._kept = np.zeros(3)
-        self._delayed = np.zeros((2, lag + 1))
+        self._delayed = np.zeros((2, half_width + 1))
 
     def update(self, signal: FloatArray, code: Codes) -> Moved:
         """The next samples of the input, shape (n,), with states of the admission."""

@@ -30,8 +30,6 @@ usual one, and that with it below a share of that without and below the last mul
 """
 PACE = 0.06
 """Relative change with every sample of the usual error, a running median."""
-HALF = 4
-"""Samples on either side of a skip from which it is told."""
 SHORTEST, LONGEST = 40.0, 4096.0
 """Intervals between skips that are followed [samples]: clocks that differ by 2.5 to 0.025 %."""
 REGULAR, MISSED = 0.04, 32
@@ -47,7 +45,7 @@ one of a slower clock is still counted.
 
 
 class Sliding(NamedTuple):
-    """An input at the samples `lag` before those given, both of shape (n,).
+    """An input at the samples `half_width` before those given, both of shape (n,).
 
     Attributes:
         mean: its mean until the next sample; 0 with too few samples.
@@ -64,15 +62,12 @@ class SlidingSteps:
     """Follows the steps of one input, block by block.
 
     Args:
-        lag: of the results [samples]; a skip is told `HALF` samples later, and where the lag is
-            shorter the clock tells the instants after it.
+        half_width: samples on either side of a skip from which it is told; results lag by it.
     """
 
-    def __init__(self, lag: int) -> None:
-        half = max(lag, HALF)
-        self._misfits = np.stack([_misfit(half, moved) for moved in (0, 1, -1)])
-        self._ring = np.zeros(2 * half)
-        self._sooner = half - lag
+    def __init__(self, half_width: int) -> None:
+        self._misfits = np.stack([_misfit(half_width, moved) for moved in (0, 1, -1)])
+        self._ring = np.zeros(2 * half_width)
         self._kept = np.zeros(len(_AT))
 
     def update(self, signal: FloatArray, code: Codes) -> Sliding:
@@ -80,7 +75,7 @@ class SlidingSteps:
         mean, known = np.zeros(code.size), np.ones(code.size, np.bool_)
         followed = np.zeros(code.size, np.bool_)
         _advance(
-            np.ascontiguousarray(signal), code, self._misfits, self._sooner, self._ring, self._kept,
+            np.ascontiguousarray(signal), code, self._misfits, self._ring, self._kept,
             mean, known, followed,
         )  # fmt: skip
         return Sliding(mean, known, followed)
@@ -117,7 +112,6 @@ def _advance(  # noqa: PLR0917 -- a kernel
     signal: FloatArray,
     code: Codes,
     misfits: FloatArray,
-    sooner: int,
     ring: FloatArray,
     kept: FloatArray,
     mean: FloatArray,
@@ -139,10 +133,9 @@ def _advance(  # noqa: PLR0917 -- a kernel
         if kept[FILLED] < size:
             continue
         way = _skipped(misfits, ring, kept)
-        share = _share(kept, sooner)
-        at = head + size // 2 - 1 + sooner
-        now, following = ring[at % size], ring[(at + 1) % size]
-        if kept[SKIPS] >= SURE and (_due(kept, sooner) if sooner else way > 0):
+        share = _share(kept)
+        now, following = ring[(head + size // 2 - 1) % size], ring[(head + size // 2) % size]
+        if way > 0 and kept[SKIPS] >= SURE:
             # The step that no sample shows lies between the two that do.
             share, following = 1.0, 0.5 * (now + following)
         mean[k] = (1.0 - share) * now + share * following
@@ -183,18 +176,11 @@ def _energy(misfit: FloatArray, ring: FloatArray, head: int) -> float:
 
 
 @part()
-def _due(kept: FloatArray, sooner: int) -> bool:
-    """Whether the clock says that a step is skipped `sooner` samples after the ring's middle."""
-    gone = (kept[AGE] + sooner) / kept[INTERVAL]
-    return bool(kept[WAY] > 0.0 and abs(gone - np.round(gone)) * kept[INTERVAL] <= 0.5)
-
-
-@part()
-def _share(kept: FloatArray, sooner: int) -> float:
-    """f `sooner` samples after the ring's middle, from the last skip and the time between skips."""
+def _share(kept: FloatArray) -> float:
+    """f, from the time since the last skip and the interval between skips."""
     if kept[SKIPS] < SURE:
         return 0.0
-    gone = ((kept[AGE] + sooner) / kept[INTERVAL]) % 1.0
+    gone = (kept[AGE] / kept[INTERVAL]) % 1.0
     return gone if kept[WAY] > 0.0 else 1.0 - gone
 
 

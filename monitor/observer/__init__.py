@@ -22,7 +22,7 @@ from monitor.observer.decision_state import (
     DecisionRules,
     new_state,
 )
-from monitor.observer.lagged_motion import EMPTY, MATCHED, WIDE, motion_kernel
+from monitor.observer.lagged_motion import EMPTY, MATCHED, motion_kernel
 from monitor.observer.missing_force import (
     DISAGREE,
     DRY_UNIT,
@@ -72,7 +72,6 @@ __all__ = [
     "SHORT",
     "SPREAD",
     "SUBSTEPS",
-    "WIDE",
     "ChannelJumps",
     "DecisionRules",
     "E",

@@ -1,6 +1,6 @@
 """The measured motion in real time: each signal filtered by a short symmetric kernel, fixed lag.
 
-Signals that are not differentiated are delayed by the same lag, so that columns refer to the same
+Signals that are not differentiated are delayed by the same lag, so all columns refer to the same
 instant. The kernels are third-order polynomial fits to the samples around each instant
 (A. Savitzky, M. Golay, Analytical Chemistry 36, 1964).
 """
@@ -16,10 +16,6 @@ from monitor.signals import DEAD, GOOD, NEW_BOOT, RESTART, Codes
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel, part
 
-WIDE = 4
-"""Half the width of the kernel of a fit, which need not hurry, and of that for a second derivative,
-which is compared with a sensor and noisy [samples].
-"""
 DELAY, MATCHED, STEPPED = -1, -2, -3
 """Codes of columns that are only delayed, smoothed like one that is differentiated twice, or half
 the change from the sample before to the sample after.
@@ -28,15 +24,10 @@ the change from the sample before to the sample after.
 
 @dataclass(frozen=True, slots=True)
 class MotionColumn:
-    """One column: a channel by index, smoothed and differentiated `order` times, or delayed.
-
-    A column `at_middle` is smoothed by all samples that are kept, and refers to the middle of them,
-    whatever the lag of the others is. Such columns are compared with each other.
-    """
+    """One column: a channel by index, smoothed and differentiated `order` times, or delayed."""
 
     channel: int
     order: int
-    at_middle: bool = False
 
 
 class FixedLag:
@@ -44,31 +35,22 @@ class FixedLag:
 
     Args:
         columns: columns computed from the channels.
-        half_width: of the kernel of a column at the middle [samples].
+        half_width: lag [samples].
         rate: sample rate [Hz].
         late: lateness of the smoothed channels behind the delayed ones [s].
         fills: whether held readings are replaced by the line between both ends of their gap.
-        lag: of all other columns, half the width of their kernel, at most `half_width`, which is
-            its default [samples].
     """
 
-    def __init__(  # noqa: PLR0917 -- a kernel's figures
+    def __init__(
         self,
         columns: Sequence[MotionColumn],
         half_width: int,
         rate: float,
         late: float = 0.0,
         fills: bool = True,
-        lag: int | None = None,
     ) -> None:
         self._fills = fills
-        ahead = half_width if lag is None else lag
-        kernels = [
-            motion_kernel(
-                column.order, half_width, rate, late, half_width if column.at_middle else ahead
-            )
-            for column in columns
-        ]
+        kernels = [motion_kernel(column.order, half_width, rate, late) for column in columns]
         self._kernels = np.array(kernels)
         self._channels = np.array([column.channel for column in columns])
         self._ring = np.zeros((2 * half_width + 1, int(self._channels.max()) + 1))
@@ -93,34 +75,22 @@ EMPTY, FIRST, WHOLE, TAINTED = 0, 1, 2, 3
 """States of a sample, see `FixedLag.update`."""
 
 
-def motion_kernel(
-    order: int, half_width: int, rate: float, late: float = 0.0, lag: int | None = None
-) -> FloatArray:
-    """Weights of a column of this order, oldest sample first, shape (2·half_width + 1,).
-
-    Args:
-        order: of the derivative, or one of the codes above; `MATCHED` has its instant at the
-            middle.
-        half_width: half the number of weights, without the middle one.
-        rate: sample rate [Hz].
-        late: lateness of the smoothed channels behind the delayed ones [s].
-        lag: half the width of the kernel, `half_width` if None; weights before it are 0.
-    """
-    width, ahead = 2 * half_width + 1, half_width if lag is None else lag
-    instant = width - 1 - ahead
+def motion_kernel(order: int, half_width: int, rate: float, late: float = 0.0) -> FloatArray:
+    """Weights of a column of this order, oldest sample first, shape (2·half_width + 1,)."""
+    width = 2 * half_width + 1
     if order == DELAY:
-        return np.asarray(np.eye(width)[instant], np.float64)
+        return np.asarray(np.eye(width)[half_width], np.float64)
     if order == STEPPED:
-        return np.asarray(0.5 * (np.eye(width)[instant + 1] - np.eye(width)[instant - 1]))
+        return np.asarray(0.5 * (np.eye(width)[half_width + 1] - np.eye(width)[half_width - 1]))
     if order == MATCHED:
         # The kernel of the second derivative is a second difference of a smoothing one.
         second = scipy.signal.savgol_coeffs(width, 3, deriv=2, delta=1.0, use="dot")
         smoothing = np.cumsum(np.cumsum(second))[:-2]
         return np.asarray(np.concatenate([[0.0], smoothing, [0.0]]), np.float64)
-    taken = 2 * ahead + 1
-    at = ahead + late * rate
-    weights = scipy.signal.savgol_coeffs(taken, 3, deriv=order, delta=1.0 / rate, pos=at, use="dot")
-    return np.concatenate([np.zeros(width - taken), weights])
+    at = half_width + late * rate
+    return np.asarray(
+        scipy.signal.savgol_coeffs(width, 3, deriv=order, delta=1.0 / rate, pos=at, use="dot")
+    )
 
 
 @part()

@@ -10,15 +10,7 @@ import numpy as np
 
 from monitor.drives import BANDS, DriveBands, DriveChanges, DriveStops, InputSteps, Steps
 from monitor.model import EquationsPlant, RemainderSection
-from monitor.observer.lagged_motion import (
-    DELAY,
-    EMPTY,
-    MATCHED,
-    STEPPED,
-    WIDE,
-    FixedLag,
-    MotionColumn,
-)
+from monitor.observer.lagged_motion import DELAY, EMPTY, MATCHED, STEPPED, FixedLag, MotionColumn
 from monitor.observer.missing_force import LATE_UNIT, HighPassed
 from monitor.observer.prediction import (
     AlongMotion,
@@ -80,9 +72,8 @@ def layout_of(model: Model, port: str) -> Layout:
     columns += [MotionColumn(places[state.channel], state.order) for state in motion]
     columns.append(MotionColumn(len(channels) - 1, DELAY))
     balance = balanced_states(model)[0]
-    columns.append(MotionColumn(places[balance.channel], balance.order + 1, at_middle=True))
-    equal = MATCHED if balance.order == 1 else 0
-    columns.append(MotionColumn(len(channels) - 1, equal, at_middle=True))
+    columns.append(MotionColumn(places[balance.channel], balance.order + 1))
+    columns.append(MotionColumn(len(channels) - 1, MATCHED if balance.order == 1 else 0))
     columns += [MotionColumn(place, STEPPED) for place in range(len(inputs))]
     names = [*model.inputs, *(state.name for state in motion)]
     hidden = [name for name in model.states if name not in names]
@@ -101,7 +92,7 @@ def layout_of(model: Model, port: str) -> Layout:
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """Results of the stage for each sample, all for the instant `lag` samples earlier.
+    """Results of the stage for each sample, all for the instant `half_width` samples earlier.
 
     Attributes:
         state: see `lagged_motion.FixedLag`, shape (n,).
@@ -142,30 +133,20 @@ class LaggedSignals:
 
     Args:
         layout: of the model.
-        half_width: of the widest kernel [samples].
+        half_width: lag [samples].
         rate: sample rate [Hz].
         late: lateness of the motion behind the predicted output's sensor [s].
         jitters: whether inputs whose steps seem to jitter are known to do so.
-        lag: of the results [samples], `half_width` if None.
     """
 
-    def __init__(  # noqa: PLR0917 -- a kernel's figures
-        self,
-        layout: Layout,
-        half_width: int,
-        rate: float,
-        late: float,
-        jitters: bool = False,
-        lag: int | None = None,
+    def __init__(
+        self, layout: Layout, half_width: int, rate: float, late: float, jitters: bool = False
     ) -> None:
-        ahead = half_width if lag is None else lag
-        self._motion = FixedLag(layout.columns, half_width, rate, late, lag=ahead)
+        self._motion = FixedLag(layout.columns, half_width, rate, late)
         places = range(layout.motions[0])
-        self._inputs = [InputSteps(ahead, jitters) for _ in places]
+        self._inputs = [InputSteps(half_width, jitters) for _ in places]
         delayed = [MotionColumn(place, DELAY) for place in places]
-        self._held = (
-            FixedLag(delayed, half_width, rate, fills=False, lag=ahead) if delayed else None
-        )
+        self._held = FixedLag(delayed, half_width, rate, fills=False) if delayed else None
 
     def update(self, signals: FloatArray, code: Codes) -> tuple[FloatArray, Codes, Steps]:
         """Columns, states, and what is known of the inputs' steps, for the next samples.
@@ -210,8 +191,7 @@ class ObserverSignals:
         jitters: bool = False,
     ) -> None:
         self.layout = layout_of(base_model(plant.model), plant.port)
-        lag = plant.half_width
-        self._motion = LaggedSignals(self.layout, max(lag, WIDE), rate, plant.late, jitters, lag)
+        self._motion = LaggedSignals(self.layout, plant.half_width, rate, plant.late, jitters)
         self._along = AlongMotion(plant, rate)
         self._drives = [DriveChanges() for _ in range(self.layout.motions[0])]
         self._bands = [DriveBands() for _ in self._drives[:1]]

@@ -9,8 +9,6 @@ from monitor.drives import Sliding, SlidingSteps
 from monitor.signals import GOOD, NEW_BOOT
 
 WIDTH, N, FINE = 4, 5000, 16
-SHORT = 2
-"""The lag of the monitor."""
 RNG = np.random.default_rng(4)
 
 
@@ -30,10 +28,10 @@ def staircase(shape, clock: float, begins: float = 0.3) -> np.ndarray:
     return shape(np.floor(at * clock + begins)).reshape(N, FINE)
 
 
-def followed(signal: np.ndarray, cuts: tuple[int, ...] = (), lag: int = WIDTH) -> Sliding:
+def followed(signal: np.ndarray, cuts: tuple[int, ...] = ()) -> Sliding:
     code = np.full(signal.size, GOOD)
     code[0] = NEW_BOOT
-    steps = SlidingSteps(lag)
+    steps = SlidingSteps(WIDTH)
     ends = pairwise((0, *cuts, signal.size))
     parts = [steps.update(signal[a:b], code[a:b]) for a, b in ends]
     return Sliding(*map(np.concatenate, zip(*parts, strict=True)))
@@ -42,16 +40,15 @@ def followed(signal: np.ndarray, cuts: tuple[int, ...] = (), lag: int = WIDTH) -
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
 @pytest.mark.parametrize("shape", [sine, triangle])
 @pytest.mark.parametrize("clock", [0.9935, 0.9978, 1.0045, 1.016])
-@pytest.mark.parametrize("lag", [SHORT, WIDTH])
-def test_mean_between_samples_is_found_once_the_clock_is_known(lag, shape, clock, noise) -> None:
+def test_mean_between_samples_is_found_once_the_clock_is_known(shape, clock, noise) -> None:
     fine = staircase(shape, clock)
-    found = followed(fine[:, 0] + noise * RNG.standard_normal(N), lag=lag)
+    found = followed(fine[:, 0] + noise * RNG.standard_normal(N))
 
-    mean, held = fine.mean(axis=1)[:-lag], fine[:-lag, 0]
+    mean, held = fine.mean(axis=1)[:-WIDTH], fine[:-WIDTH, 0]
     late = slice(-N // 4, None)
     assert not found.known.all()
     assert found.known[late].all()
-    left = np.std((found.mean[lag:] - mean)[late])
+    left = np.std((found.mean[WIDTH:] - mean)[late])
     assert left < 0.25 * np.std((held - mean)[late])
 
 
@@ -78,12 +75,11 @@ def test_skips_that_a_corner_hides_do_not_double_the_interval() -> None:
     ],
     ids=["locked", "noisy", "free", "square", "chirp", "noise", "rest"],
 )
-@pytest.mark.parametrize("lag", [SHORT, WIDTH])
-def test_other_inputs_stay_as_they_are(signal, lag) -> None:
-    found = followed(signal, lag=lag)
+def test_other_inputs_stay_as_they_are(signal) -> None:
+    found = followed(signal)
 
     assert found.known.all()
-    assert np.array_equal(found.mean[2 * WIDTH :], signal[2 * WIDTH - lag : -lag])
+    assert np.array_equal(found.mean[2 * WIDTH :], signal[WIDTH:-WIDTH])
 
 
 def test_a_jump_of_phase_is_no_clock() -> None:

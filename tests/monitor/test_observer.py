@@ -243,22 +243,6 @@ def test_motion_is_late_by_half_the_kernel() -> None:
     assert np.array_equal(columns[8:, 2], t[4:-4])
 
 
-def test_a_kernel_that_reaches_less_far_ahead_lags_less() -> None:
-    t = np.arange(200) / RATE
-    x = np.column_stack([0.01 * t**3, t])
-    code = np.zeros(200, np.int64)
-    code[0] = 4
-    columns = [MotionColumn(0, 1), MotionColumn(1, DELAY), MotionColumn(0, 2, at_middle=True)]
-    lag = FixedLag(columns, 4, RATE, lag=2)
-
-    found, state = lag.update(x, code)
-
-    assert state[8] == 1
-    assert np.allclose(found[8:, 0], 0.03 * t[6:-2] ** 2, atol=1e-9)
-    assert np.array_equal(found[8:, 1], t[6:-2])
-    assert np.allclose(found[8:, 2], 0.06 * t[4:-4], atol=1e-7)
-
-
 @pytest.mark.parametrize("effect", [("actuator_gain", 0.95), ("actuator_gain", 0.9)])
 def test_a_lost_gain_of_the_drive_is_not_called_friction(effect: tuple[str, float]) -> None:
     """At the resonance it is in phase with the speed, as friction is."""

@@ -16,6 +16,7 @@ from monitor.commissioning.end_stop import hit_stops
 from monitor.commissioning.equations.equations_model import equations_model
 from monitor.commissioning.equations.fitted_equations import (
     fitted_equations,
+    half_width_of,
     motion_of,
 )
 from monitor.commissioning.equations.healthy_remainder import healthy_remainder
@@ -78,9 +79,12 @@ def commission_equations(
 def _seem_to_jitter(used: Sequence[Recording], name: str, rate: float) -> list[bool]:
     """Of which recordings the inputs' steps seem to jitter, which the motion must confirm."""
     layout = layout_of(base_model(name), force_port(base_model(name)))
+    lag = half_width_of(name)
     seem = []
     for one in used:
-        readings, in_force = (motion_of(one, layout, rate, 0.0, each) for each in (False, True))
+        readings, in_force = (
+            motion_of(one, layout, lag, rate, 0.0, each) for each in (False, True)
+        )
         seem.append(not np.array_equal(readings, in_force))
     return seem
 

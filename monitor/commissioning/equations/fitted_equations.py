@@ -14,7 +14,6 @@ from monitor.model import (
 )
 from monitor.observer import (
     EMPTY,
-    WIDE,
     LaggedSignals,
     Layout,
     base_model,
@@ -27,13 +26,13 @@ from rigwatch.wire.arrays import FloatArray
 
 FITTED, CHIRP = 6.5, 14.5
 """Length of the fitted part of a recording, and of one with a frequency sweep [s]."""
-LAG = 3
-"""Samples by which the monitor lags, and half the width of its kernel. The residual of healthy rigs
-is as small as with the four of a fit. With two, skips and edges of a generator with a clock of its
-own are judged too early.
-"""
 TURNS = 4.0
 """Multiple of the speed's noise indistinguishable from rest."""
+
+
+def half_width_of(name: str) -> int:
+    """Half the width of the kernel that smooths the motion, of a shipped model [samples]."""
+    return EquationsPlant(model=name, names=(), values=(), port="").half_width
 
 
 def fitted_equations(  # noqa: PLR0917 -- all that is known
@@ -57,9 +56,11 @@ def fitted_equations(  # noqa: PLR0917 -- all that is known
     model = base_model(name)
     port = force_port(model)
     layout = layout_of(model, port)
+    lag = half_width_of(name)
     late = _lateness(used, layout, rate)
     moved = [
-        motion_of(one, layout, rate, late, each) for one, each in zip(used, jitters, strict=True)
+        motion_of(one, layout, lag, rate, late, each)
+        for one, each in zip(used, jitters, strict=True)
     ]
     n = layout.inputs
     known = fit_sensor(model, [(m[:, :n], m[:, n], m[:, n + 1]) for m in moved], rate)
@@ -68,14 +69,14 @@ def fitted_equations(  # noqa: PLR0917 -- all that is known
         _cut(m, layout, round((CHIRP if one.role == "chirp" else FITTED) * rate))
         for one, m in zip(used, moved, strict=True)
     ]
-    turn = TURNS * _speed_noise(used, layout, rate)
+    turn = TURNS * _speed_noise(used, layout, lag, rate)
     noise = min(white_noise(one.channel(layout.channels[-1])) for one in used)
     found = fit_healthy(
         name, port, stretches, turn=turn, corner=corner, rate=rate, noise=noise, known=known
     )
     return EquationsPlant(
         model=name, names=found.names, values=found.values, port=port, coulomb=found.coulomb,
-        turn=turn, half_width=LAG, late=late, corner=corner,
+        turn=turn, half_width=lag, late=late, corner=corner,
     )  # fmt: skip
 
 
@@ -90,19 +91,20 @@ def _lateness(used: Sequence[Recording], layout: Layout, rate: float) -> float:
     return lateness(pairs, 1.0 / rate, column.order)
 
 
-def motion_of(
-    one: Recording, layout: Layout, rate: float, late: float, jitters: bool
+def motion_of(  # noqa: PLR0917
+    one: Recording, layout: Layout, lag: int, rate: float, late: float, jitters: bool
 ) -> FloatArray:
     """Columns of the inputs and the smoothed motion, shape (n, columns).
 
     Args:
         one: recording.
         layout: of the columns.
+        lag: half the kernel's width [samples].
         rate: sample rate [Hz].
         late: lateness of the motion behind its sensor [s].
         jitters: whether the inputs' steps jitter.
     """
-    signals = LaggedSignals(layout, WIDE, rate, late, jitters)
+    signals = LaggedSignals(layout, lag, rate, late, jitters)
     columns, state, _ = signals.update(*admitted(one, layout))
     return np.ascontiguousarray(columns[state != EMPTY])
 
@@ -120,9 +122,9 @@ def _cut(moved: FloatArray, layout: Layout, n: int) -> tuple[FloatArray, FloatAr
     return np.ascontiguousarray(moved[:n, :inputs]), np.ascontiguousarray(moved[:n, [inputs]])
 
 
-def _speed_noise(used: Sequence[Recording], layout: Layout, rate: float) -> float:
+def _speed_noise(used: Sequence[Recording], layout: Layout, lag: int, rate: float) -> float:
     column = layout.columns[layout.speed]
     channel = layout.channels[column.channel]
-    kernel = savgol_coeffs(2 * WIDE + 1, 3, deriv=column.order, delta=1.0 / rate)
+    kernel = savgol_coeffs(2 * lag + 1, 3, deriv=column.order, delta=1.0 / rate)
     noises = [white_noise(one.channel(channel)) for one in used]
     return max(min(noises) * float(np.linalg.norm(kernel)), 1e-9)
