@@ -69,10 +69,18 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
             "chains",
             "hidden_effects_rig",
             "rig_intervals",
+            "multi_start_fits",
             "next_experiment",
             "explain_speed",
             "simulation_speed",
         ),
+    ),
+    (
+        "Rigs that nobody here built",
+        "Rigs simulated by people who had not read the estimator, and random rigs whose equations "
+        "are held out, played through the commands. A letter is a kind of rig. `earlier_rigs` was "
+        "measured with earlier code, and not again.",
+        ("independent_rigs", "earlier_rigs", "along_calibration"),
     ),
     (
         "The workbench in a browser",
