@@ -5,7 +5,7 @@ back gives the same estimates to the last bit.
 """
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from msgspec import Meta, field, structs
 
@@ -20,10 +20,9 @@ from rigwatch.physics.transfer import TransferFunction
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.rig_config import FASTEST, SLOWEST
 from rigwatch.wire.typed_files import Section, load, parse
+from rigwatch.wire.wiring_names import Wiring
 
 Floats = tuple[float, ...]
-Wiring = Literal["wiring_sign", "wiring_scale", "wiring_swapped", "wiring_drive"]
-"""What the wiring check finds, by the name of its alarm."""
 
 
 class FunctionSection(Section, frozen=True, kw_only=True):

@@ -22,11 +22,12 @@ from monitor.pipeline.pipeline import Monitor
 from monitor.pipeline.result import Result
 from monitor.pipeline.steady_kernel import Outputs
 from monitor.signals import GAP, SENSOR_CLIPPED, SENSOR_INVALID, Condition, above
-from monitor.wiring import DRIVE, WIRING, WiringCheck
+from monitor.wiring import DRIVE, WiringCheck
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kept_state import KeptState
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock, cut
 from rigwatch.wire.rig_config import AlarmSection
+from rigwatch.wire.wiring_names import WIRING
 
 if TYPE_CHECKING:
     from monitor.pipeline.observer_pipeline import ObserverMonitor

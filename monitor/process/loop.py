@@ -32,14 +32,7 @@ from monitor.process.presence import Presence
 from monitor.process.rig_time import RigTime
 from monitor.process.startup_grace import Patience
 from monitor.signals import MONITOR_RESET
-from rigwatch.wire.bus import (
-    Bus,
-    CommandCheck,
-    ShelvedAlarm,
-    joined,
-    serve_alarm_list,
-    serve_shelf,
-)
+from rigwatch.wire.bus import Bus, CommandCheck, joined, serve_alarm_list, serve_shelf
 from rigwatch.wire.delivery import POSITION_WRONG, Item, SampleReader
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.host import (
@@ -110,7 +103,7 @@ class MonitorProcess:
         self._router_lost_at: float | None = None
         self._recorder: Health | None = None
         self._unsuitable = ""
-        self._standing, self._shelf = self.rig.alarms.standing(), list[ShelvedAlarm]()
+        self._standing = self.rig.alarms.standing()
         check = CommandCheck(bus, config.bus.security)
         self._operators = OperatorDesk(bus, check)
         bus.announce()
@@ -124,7 +117,7 @@ class MonitorProcess:
             standing = self.rig.alarms.restore(newest, time.time_ns())
             self.say([*just_returned(newest), *standing])
             self._standing = self.rig.alarms.standing()
-            self._shelf = shelf_of(self.rig.alarms)
+        self._shelf = shelf_of(self.rig.alarms)
         # Only now: before, an answer would say that no alarm stands.
         serve_alarm_list(bus, lambda: self._explainer.with_causes(self._standing))
         serve_shelf(bus, lambda: self._shelf)

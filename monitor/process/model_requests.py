@@ -11,11 +11,11 @@ from msgspec import structs
 from monitor.model import RigModel, model_text, parse_model
 from monitor.model import model_versions as versions
 from monitor.pipeline import RigMonitor, check_can_follow
-from monitor.wiring import WIRING
 from rigwatch.wire.bus import KEY, PATIENCE, Bus, CommandCheck, ModelReply, ModelRequest
 from rigwatch.wire.errors import ModelError, RigwatchError
 from rigwatch.wire.messages import LONGEST_NAME, LONGEST_TEXT, Identity, ModelChange
 from rigwatch.wire.typed_files import JsonError, json_value
+from rigwatch.wire.wiring_names import WIRING
 
 BEGUN_WITHIN = 2.4
 """Time after which a change that has not begun is withdrawn [s]."""

@@ -4,6 +4,6 @@ At the monitor's start (`WiringCheck`), and of recordings that a model is made o
 """
 
 from monitor.wiring.recorded_wiring import recorded_wiring
-from monitor.wiring.wiring_check import DRIVE, WIRING, WiringCheck
+from monitor.wiring.wiring_check import DRIVE, WiringCheck
 
-__all__ = ["DRIVE", "WIRING", "WiringCheck", "recorded_wiring"]
+__all__ = ["DRIVE", "WiringCheck", "recorded_wiring"]

@@ -4,10 +4,10 @@ from collections import Counter
 
 import numpy as np
 
-from monitor.model import Wiring
 from monitor.signals import Recording
 from monitor.wiring.motion_ratio import MotionRatio, motion_ratio
 from monitor.wiring.wiring_check import GAIN, PHASE, SCALE, SIGN, WINDOW, wrong_wiring
+from rigwatch.wire.wiring_names import Wiring
 
 
 def recorded_wiring(recording: Recording) -> tuple[Wiring, str] | None:

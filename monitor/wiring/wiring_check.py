@@ -10,16 +10,17 @@ wrong wiring would count as healthy. From the first bad window on nothing is jud
 good one; it takes the second to be told. What a person has accepted, which the model says, passes.
 """
 
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
-from monitor.model import RigModel, TransferPlant, Wiring
+from monitor.model import RigModel, TransferPlant
 from monitor.signals import Condition, above, usable
 from monitor.wiring.drive_ratio import ModelledDrive, drive_ratio
 from monitor.wiring.motion_ratio import MotionRatio, motion_ratio
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.messages import SampleBlock
+from rigwatch.wire.wiring_names import WIRING, Wiring
 
 WINDOW = 1.0
 """Length of a window [s]."""
@@ -36,7 +37,6 @@ DRIVE_GAIN = 5.0
 friction and faults leave 0.55 to 1.4 on the simulated rig and on one simulated by others; units
 differ by ten or more.
 """
-WIRING: tuple[Wiring, ...] = get_args(Wiring)
 SIGN, SCALE, SWAPPED, DRIVE = WIRING
 
 

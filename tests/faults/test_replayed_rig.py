@@ -9,10 +9,10 @@ from msgspec import structs
 from scipy.signal import lfilter
 
 from monitor.model import RigModel, TransferPlant
-from monitor.wiring import WIRING
 from rigwatch.physics.transfer import velocity_filter
 from rigwatch.wire.messages import NON_FINITE, Column, SampleBlock
 from rigwatch.wire.session import SessionWriter, run_info
+from rigwatch.wire.wiring_names import WIRING
 from tests.bus.publisher import wave
 from tests.faults.field import RATE, Field
 from tests.monitor_process.model import MODEL

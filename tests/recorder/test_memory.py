@@ -78,7 +78,7 @@ threading.Thread(target=watch).start()
 """
 
 
-@pytest.mark.parametrize(
+every_process = pytest.mark.parametrize(
     "begin",
     [
         "recorder.run(Path(sys.argv[1]), stop)",
@@ -87,15 +87,23 @@ threading.Thread(target=watch).start()
         "router.run(load_rig(sys.argv[1]), stop)",
     ],
 )
-def test_what_start_up_made_is_not_looked_at_again(tmp_path: Path, begin: str) -> None:
-    with TestRig(tmp_path) as rig:
+
+
+def said_by(folder: Path, program: str, begin: str, timeout: float) -> list[str]:
+    """The words that a program prints which begins one of the processes."""
+    with TestRig(folder) as rig:
         if "router" not in begin:
             rig.router()
         said = subprocess.run(
-            [sys.executable, "-c", OBJECTS_LOOKED_AT.format(begin=begin), str(rig.path)],
-            cwd=tmp_path, check=True, timeout=60, capture_output=True, text=True,
+            [sys.executable, "-c", program.format(begin=begin), str(rig.path)],
+            cwd=folder, check=True, timeout=timeout, capture_output=True, text=True,
         )  # fmt: skip
-    settled, looked_at = map(int, said.stdout.split())
+    return said.stdout.split()
+
+
+@every_process
+def test_what_start_up_made_is_not_looked_at_again(tmp_path: Path, begin: str) -> None:
+    settled, looked_at = map(int, said_by(tmp_path, OBJECTS_LOOKED_AT, begin, 60.0))
     assert settled > 10_000
     assert looked_at < settled / 10
 
@@ -130,23 +138,8 @@ print("tidying" in {{one.name for one in threading.enumerate()}})
 """
 
 
-@pytest.mark.parametrize(
-    "begin",
-    [
-        "recorder.run(Path(sys.argv[1]), stop)",
-        "recorder.run_several([Path(sys.argv[1])], stop)",
-        "witness.run(load_rig(sys.argv[1]), stop)",
-        "router.run(load_rig(sys.argv[1]), stop)",
-    ],
-)
+@every_process
 def test_freed_tuples_are_not_kept_for_months(tmp_path: Path, begin: str) -> None:
-    with TestRig(tmp_path) as rig:
-        if "router" not in begin:
-            rig.router()
-        said = subprocess.run(
-            [sys.executable, "-c", TUPLES_KEPT.format(begin=begin), str(rig.path)],
-            cwd=tmp_path, check=True, timeout=90, capture_output=True, text=True,
-        )  # fmt: skip
-    let_go, still_there = said.stdout.split()
+    let_go, still_there = said_by(tmp_path, TUPLES_KEPT, begin, 90.0)
     assert int(let_go) >= 1500
     assert still_there == "False", "the thread ends with the process's work"

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigwatch.commands.common import add_user, print_json
+from rigwatch.wire.wiring_names import WIRING
 
 if TYPE_CHECKING:
     from rigwatch.wire.bus import Bus, DeviceReply, ModelReply
@@ -16,7 +17,6 @@ EXAMPLE = """  rigwatch accept rig.toml --user ann --text "converter exchanged"
   rigwatch accept rig.toml wiring_sign --user ann --text "the sensor hangs upside down"
   rigwatch accept rig.toml --show"""
 TIMEOUT = 3.0
-WIRING = ("wiring_sign", "wiring_scale", "wiring_swapped", "wiring_drive")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

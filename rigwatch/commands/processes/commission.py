@@ -8,8 +8,9 @@ from rigwatch.commands.common import POSITIVE, named_values, print_result, say, 
 from rigwatch.commands.processes.model_place import check_place, install_model
 
 if TYPE_CHECKING:
-    from monitor.model import RigModel, Wiring
+    from monitor.model import RigModel
     from monitor.signals import Recording, Role
+    from rigwatch.wire.wiring_names import Wiring
 
 TRANSFER_S, EQUATIONS_S = (3.0, 3.0), (10.0, 65.0)
 """Time of commissioning: at least, and more for each 100 000 samples [s]."""

@@ -157,10 +157,12 @@ def _file_index(path: Path, summary: bytes, start: int) -> FileIndex | None:
     if not crc or not places or len(places) != counted:
         return None
     data_end = start - _DATA_END.size
-    spans = _spans(summary, np.array(places), first, data_end)
+    at = np.array(places)
+    heads = _gathered(summary, at, _HEAD)
+    spans = _spans(summary, at, heads, first, data_end)
     if spans is None:
         return None
-    channel, several = _channels(summary, np.array(places))
+    channel, several = _channels(summary, at, heads["width"])
     return FileIndex(tuple(declarations), spans, channel, several, data_end, crc)
 
 
@@ -175,10 +177,11 @@ def _ends(path: Path, start: int) -> tuple[int, int]:
     return len(MAGIC) + RECORD.size + length, crc
 
 
-def _spans(summary: bytes, places: Places, first: int, last: int) -> IntArray | None:
+def _spans(
+    summary: bytes, places: Places, heads: NDArray[Any], first: int, last: int
+) -> IntArray | None:
     """Where chunks lie whose indexes have their bodies at `places`; None if they do not fill the
     file from `first` to `last` with the message indexes behind them."""
-    heads = _gathered(summary, places, _HEAD)
     behind = _gathered(summary, places + _HEAD.itemsize + heads["width"], _SIZE)
     if max(heads["size"].max(), behind.max()) > LARGEST_RECORD:
         return None
@@ -190,9 +193,10 @@ def _spans(summary: bytes, places: Places, first: int, last: int) -> IntArray | 
     return np.stack([heads["begin"], ends], axis=1).astype(np.int64)
 
 
-def _channels(summary: bytes, places: Places) -> tuple[IntArray, dict[int, frozenset[int]]]:
+def _channels(
+    summary: bytes, places: Places, width: NDArray[Any]
+) -> tuple[IntArray, dict[int, frozenset[int]]]:
     """The channel of each chunk, and of those that have several or none, all."""
-    width = _gathered(summary, places, _HEAD)["width"]
     channel = _gathered(summary, places + _HEAD.itemsize, _NUMBER).astype(np.int64)
     several: dict[int, frozenset[int]] = {}
     for row in np.flatnonzero(width != _COUNT.size).tolist():

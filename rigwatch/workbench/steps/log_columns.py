@@ -180,26 +180,22 @@ def _chosen(
     for choose in (_named, _measured):
         for name in tuple(missing):
             signal = signals[name]
-            if column := choose(name, signal.channel or name, signal, free):
+            if column := choose(name, signal, free):
                 free.remove(column)
                 missing.remove(name)
                 yield name, column
 
 
-def _named(
-    name: str, channel: str, signal: Input | Output, headers: Sequence[Header]
-) -> Header | None:
+def _named(name: str, signal: Input | Output, headers: Sequence[Header]) -> Header | None:
     """The column of a signal by name, or by a part of it."""
     suiting = [header for header in headers if not header.units or _fits(header, signal)]
-    wanted = {name.lower(), channel.lower()}
+    wanted = {name.lower(), (signal.channel or name).lower()}
     named = [header for header in suiting if header.name in wanted]
     alike = [h for h in suiting if any(_within(word, h.name) for word in wanted)]
     return next((chosen[0] for chosen in (named, alike) if len(chosen) == 1), None)
 
 
-def _measured(
-    _name: str, _channel: str, signal: Input | Output, headers: Sequence[Header]
-) -> Header | None:
+def _measured(_name: str, signal: Input | Output, headers: Sequence[Header]) -> Header | None:
     """The column of a signal if it is the only one with a matching unit that no name took."""
     suiting = [header for header in headers if header.units and _fits(header, signal)]
     return suiting[0] if len(suiting) == 1 else None

@@ -27,6 +27,7 @@ from rigwatch.physics.engine.fit.recording import (
 )
 from rigwatch.physics.engine.fit.ties import untied
 from rigwatch.physics.engine.fit.windowed_fit import (
+    QUIET,
     Fit,
     Prior,
     bounds,
@@ -39,6 +40,7 @@ from rigwatch.physics.engine.fit.windowed_fit import (
 
 __all__ = [
     "ENOUGH",
+    "QUIET",
     "EffectStates",
     "Fit",
     "Prior",

@@ -104,10 +104,10 @@ class Fit:
 
 
 # Results are checked for being finite; NumPy's warnings are redundant.
-_QUIET = np.errstate(over="ignore", invalid="ignore")
+QUIET = np.errstate(over="ignore", invalid="ignore")
 
 
-@_QUIET
+@QUIET
 def fit(
     compiled: CompiledSystem,
     recording: Recording,
@@ -226,7 +226,7 @@ def _deviations(residual: FloatArray, jacobian: FloatArray, theta: FloatArray) -
     return np.where(told, noise / np.where(slope > 0, slope, 1.0), np.where(theta != 0, size, 1.0))
 
 
-@_QUIET
+@QUIET
 def evaluate(
     fitted: Fit,
     recording: Recording,
@@ -256,7 +256,7 @@ def evaluate(
     return replace(result_of(problem, found), covariance=fitted.covariance)
 
 
-@_QUIET
+@QUIET
 def error_at(  # noqa: PLR0917 -- they belong together
     compiled: CompiledSystem,
     recording: Recording,

@@ -24,6 +24,7 @@ import scipy
 from rigwatch.physics.engine.compile import CompiledSystem, rate_limit
 from rigwatch.physics.engine.fit import (
     ENOUGH,
+    QUIET,
     Fit,
     Prior,
     Problem,
@@ -45,11 +46,7 @@ MOST = 30
 """Most evaluations of a fit."""
 
 
-# Results are checked for being finite; NumPy's warnings are redundant.
-_QUIET = np.errstate(over="ignore", invalid="ignore")
-
-
-@_QUIET
+@QUIET
 def fit_continued(
     compiled: CompiledSystem,
     recording: Recording,
@@ -79,7 +76,7 @@ def fit_continued(
     return windows.fitted(prior) if windows.continue_anywhere else found
 
 
-@_QUIET
+@QUIET
 def continued_error_at(
     found: Fit, recording: Recording, horizon: int, substeps: int, parameters: FloatArray
 ) -> float:
