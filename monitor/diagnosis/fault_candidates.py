@@ -239,9 +239,9 @@ def _rivals(best: Suspect, rows: Sequence[Suspect]) -> str:
     kin = {row.label for row in rows if (row.family, row.port) == (best.family, best.port)}
     named, more = best.alike[:6], len(best.alike) - 6
     listed = ", ".join(named) + (f" and {more} more" if more > 0 else "")
-    if not best.family or not kin.issuperset(best.alike):
-        return f"; cannot be told from {listed}, so check these too"
     verb = "explains" if len(best.alike) == 1 else "explain"
+    if not best.family or not kin.issuperset(best.alike):
+        return f"; {listed} {verb} as much in this motion, so check these too"
     return (
         f"; {best.family} at {best.port} is settled, by which law is not: "
         f"{listed} {verb} as much, and neither alarm nor action depends on it"

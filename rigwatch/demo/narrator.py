@@ -20,6 +20,10 @@ ACTS = {
         "the valve's gain is whole again",
     ),
 }
+WHERE_TO_LOOK = (
+    "on the dashboard, watch the verdict and the residual: measured minus modelled acceleration,",
+    "which stays within its limits while the rig is healthy",
+)
 NEUTRAL = {"coulomb": 0.0, "actuator_gain": 1.0}
 WHY_LATER = "later than the alarm: every known effect is compared with two seconds of samples"
 SIZE = "theta1"
@@ -88,7 +92,7 @@ class Narrator:
         self.explained = False
         self._attended, self._known, self._size = attended, known, 0.0
         self._say, self._config = say, rig
-        self._rate = scenario.plant.sample_rate
+        self._rate, self._cycle_s = scenario.plant.sample_rate, scenario.cycle_s
         self._acts = acts(scenario)
         self._next = next(self._acts, None)
         self._last: Act | None = None
@@ -123,7 +127,11 @@ class Narrator:
     def begin(self, seq: int) -> None:
         """Say that faults are planned, and how long after this sample the first comes."""
         if self._next is not None:
-            self._say("            the demo puts faults into the rig and takes them out again")
+            again = f", every {self._cycle_s:g} s until you end it" if self._cycle_s else ""
+            self._say(f"            the demo puts faults into the rig and takes them out{again}")
+            if self._attended:
+                for line in WHERE_TO_LOOK:
+                    self._say(f"            {line}")
         self._announce("first", seq)
 
     def _announce(self, which: str, seq: int) -> None:
@@ -180,9 +188,10 @@ class Narrator:
             newest = self.alarms[-1].name if self.alarms else ""
             # An explanation bears the name of the first alarm, which is mostly a departure.
             if newest == ALARM or event.text.startswith(ALARM):
-                force = self._size * self._known
-                times = f"{self._size:.2f} times the {self._known:g} N of the third recording"
-                self._say(f"            measured friction: {force:.2f} N ({times})")
+                force, times = f"{self._size * self._known:.2f} N", f"{self._size:.2f} times"
+                known = f"{self._known:g} N of the recording with known friction"
+                self._say(f"            measured friction: {force}, {times} the")
+                self._say(f"            {known}, from which its model was made")
             effect = re.search(r"(\w+)@\w", found)  # an effect at a port is written effect@port
             if effect:
                 self._say(f"            more about it: $ rigwatch effects {effect[1]}")

@@ -109,10 +109,10 @@ def test_rivals_of_one_family_leave_the_kind_of_fault_without_doubt() -> None:
     assert "cannot be told" not in settled
     for other in (leak, elsewhere):
         both = replace(best, alike=(law.label, other.label))
-        assert f"cannot be told from {law.label}, {other.label}" in in_words([both, law, other])
+        assert f"{law.label}, {other.label} explain as much in this motion, so check" in in_words([both, law, other])
     nameless = replace(law, family="")
     alone = replace(best, family="", alike=(law.label,))
-    assert "cannot be told from" in in_words([alone, nameless]), "no family is none in common"
+    assert "so check these too" in in_words([alone, nameless]), "no family is none in common"
 
 
 def test_what_no_effect_explains_is_not_given_a_name() -> None:

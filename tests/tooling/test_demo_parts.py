@@ -176,7 +176,8 @@ def test_the_wait_for_the_next_fault_is_told_at_the_start_and_after_each_one() -
     said: list[str] = []
     narrator = narrator_to(said)
     narrator.begin(5 * RATE)
-    assert "the demo puts faults into the rig" in said[0]
+    assert "the demo puts faults into the rig and takes them out, every 120 s" in said[0]
+    assert any("on the dashboard, watch the verdict" in line for line in said)
     assert "the first fault comes in 15 s; Ctrl-C ends the demo" in said[-1]
     narrator.samples(40 * RATE)
     assert "dry friction" in said[-1]
@@ -225,7 +226,8 @@ def test_what_is_missing_in_the_model_is_told_and_other_events_are_not() -> None
     assert [line.strip() for line in said] == [
         f"probably missing in the rig's model: {found}",
         f"({WHY_LATER})",
-        "measured friction: 0.44 N (1.02 times the 0.43 N of the third recording)",
+        "measured friction: 0.44 N, 1.02 times the",
+        "0.43 N of the recording with known friction, from which its model was made",
         "more about it: $ rigwatch effects coulomb",
     ]
     said.clear()
