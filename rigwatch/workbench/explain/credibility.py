@@ -1,12 +1,19 @@
-"""An effect is credible only if it is clearly stronger than its apparent strength when healthy.
+"""Effects that are not named although the held-out error falls with them.
 
-Model error mimics a little of every effect on a healthy recording. The apparent strength of an
-effect there, to first order, is the part that model error can account for.
+An effect is credible only if it is clearly stronger than its apparent strength when healthy. Model
+error mimics a little of every effect on a healthy recording; the apparent strength of an effect
+there, to first order, is the part that model error can account for.
+
+What `add` refused in the study's present state is not named as missing: there the study was fitted
+anew with the effect, and lost what a single fit had gained.
 """
+
+from dataclasses import replace
 
 from rigwatch.workbench.compare import Bench, apparent_strength
 from rigwatch.workbench.explain.verdict import Verdict, judge
 from rigwatch.workbench.ranking import Ranked
+from rigwatch.workbench.study import refusals
 
 STRONGER = 3.0
 """Smallest ratio of an effect's strength to its apparent strength on the healthy recording."""
@@ -14,12 +21,27 @@ STRONGER = 3.0
 
 def credible_verdict(bench: Bench, rows: list[Ranked]) -> Verdict:
     """The verdict among the credible effects; the others are no longer accepted."""
+    refused = refusals(bench.study)
+    for row in rows:
+        if row.accepted and (reason := refused.get((row.label,))) is not None:
+            row.accepted, row.reason = False, f"as `add` found: {reason}"
     verdict = judge(bench.base, rows, bench.floor)
     while verdict.best is not None and apparent_when_healthy(bench, verdict.best):
         verdict.best.accepted = False
         verdict.best.reason = "nearly as strong on the healthy recording"
         verdict = judge(bench.base, rows, bench.floor)
     return verdict
+
+
+def unless_refused(bench: Bench, verdict: Verdict) -> Verdict:
+    """The verdict; `unknown_effect` if `add` refused the set in which it names an effect."""
+    if verdict.word != "missing_effect" or verdict.best is None:
+        return verdict
+    reason = refusals(bench.study).get((verdict.best.label, *sorted(verdict.beside)))
+    if reason is None:
+        return verdict
+    text = f"{verdict.text}; but `add` found: {reason}"
+    return replace(verdict, word="unknown_effect", text=text)
 
 
 def apparent_when_healthy(bench: Bench, row: Ranked) -> bool:

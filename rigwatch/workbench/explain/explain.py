@@ -17,7 +17,7 @@ from rigwatch.workbench.explain.adequacy import (
     with_change_told,
 )
 from rigwatch.workbench.explain.changed_parameters import undetermined_if_parameters_changed
-from rigwatch.workbench.explain.credibility import credible_verdict
+from rigwatch.workbench.explain.credibility import credible_verdict, unless_refused
 from rigwatch.workbench.explain.exchange import Exchange, exchange
 from rigwatch.workbench.explain.excitation import cannot_tell, unexcited
 from rigwatch.workbench.explain.explanation import STRENGTH_TOLD, Explanation, explanation
@@ -163,7 +163,7 @@ def _judged(bench: Bench, rows: list[Ranked], progress: Progress) -> tuple[list[
         verdict = _by_pairs(bench, rows, verdict, progress)
     elif may_need_several(bench, verdict):
         verdict = several_effects(bench, rows, verdict, progress)
-    verdict = with_motion_sensor(bench, verdict)
+    verdict = unless_refused(bench, with_motion_sensor(bench, verdict))
     if along and bench.study.model.rough:
         verdict = limited_verdict(bench.base, rows, bench.floor, verdict)
     elif along:

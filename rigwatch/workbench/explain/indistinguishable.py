@@ -1,8 +1,9 @@
 """Effects that a recording cannot tell from the best: its class, and rivals of other physics.
 
 The class are effects of the same physics, or with the same residual to first order, whose error is
-the same. Rivals are effects of other physics whose directions are similar and whose errors do not
-differ beyond chance, or beyond what other missing physics or the model's own error may favour.
+the same; if one is a sensor's and the other is not, they are rivals. Rivals are also effects of
+other physics whose directions are similar and whose errors do not differ beyond chance, or beyond
+what other missing physics or the model's own error may favour.
 """
 
 from collections.abc import Sequence
@@ -21,7 +22,7 @@ An effect may be named for its parameters and be behind.
 NO_DIFFERENCE = 1e-4
 """Relative difference of errors that reflects only where two fits stopped."""
 A_TRACE = 0.01
-"""Relative difference of errors that does not tell which signal of a machine is late."""
+"""Relative difference of errors that does not tell a sensor's effect from the machine's."""
 PERHAPS = 1.0
 """Standard deviations by which an effect with more parameters must be ahead to be a rival."""
 NEARLY = 0.8
@@ -47,12 +48,10 @@ def undistinguished(
         if row is best:
             continue
         cosine = best.cosines.get(row.label, 0.0)
-        if _same_shift(best, row):
-            members.append(row.label)
-        elif cosine > SAME or same_family(best, row):
-            if _in_class(best, row, cosine, trusted=trusted):
-                members.append(row.label)
-        elif _rivals(best, row, cosine, trusted=trusted):
+        kin = cosine > SAME or same_family(best, row)
+        if _same_shift(best, row) or (kin and _in_class(best, row, cosine, trusted=trusted)):
+            (rivals if _at_the_other_end(best, row, cosine) else members).append(row.label)
+        elif not kin and _rivals(best, row, cosine, trusted=trusted):
             rivals.append(row.label)
     rivals += _parallel_to_rivals(rows, rivals, {*members, *rivals})
     refining = {row.label for row in rows if row is not best and _lower(row) in members}
@@ -86,6 +85,21 @@ def _in_class(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> boo
     return not trusted and row.accepted and cosine > ALIKE and near and _is_simple_enough(best, row)
 
 
+def _at_the_other_end(best: Ranked, row: Ranked, cosine: float) -> bool:
+    """Whether one is a sensor's and the other is not, with the same result.
+
+    However alike they are to this recording: who mends a late sensor does not look at a late drive.
+    """
+    if (best.kind == "sensor") == (row.kind == "sensor"):
+        return False
+    return cosine > SAME if row.fitted is None else _as_small(best, row)
+
+
+def _as_small(best: Ranked, row: Ranked) -> bool:
+    """Whether its error is no more than a trace larger, if it is accepted."""
+    return row.accepted and row.held_out_error < (1 + A_TRACE) * best.held_out_error
+
+
 def _same_shift(best: Ranked, row: Ranked) -> bool:
     """Whether both shift the machine's only input or only output in time, with the same result.
 
@@ -103,7 +117,7 @@ def _same_shift(best: Ranked, row: Ranked) -> bool:
     cosine = best.cosines.get(row.label, 0.0)
     if len(model.driving()) == 1:
         return cosine > SIMILAR
-    return cosine > SAME and row.held_out_error < (1 + A_TRACE) * best.held_out_error
+    return cosine > SAME and _as_small(best, row)
 
 
 def _rivals(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:

@@ -118,7 +118,7 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
     evidence = Evidence(
         floor.left_over(base.held_out, best.fitted.held_out), _margin(best, rows, members + rivals)
     )
-    word, text = _word(base, best, rivals, floor)
+    word, text = _word(base, best, members, rivals, floor)
     ahead = None if trusted else _passed_over(best, accepted)
     if word == "missing_effect":
         doubt = _doubt(base, best, ahead, rows, floor, members=members, trusted=trusted)
@@ -182,7 +182,11 @@ def _refuse_what_hardly_trains(base: Fitted, rows: Sequence[Ranked]) -> None:
 
 
 def _word(
-    base: Fitted, best: Ranked, rivals: tuple[str, ...], floor: NoiseFloor
+    base: Fitted,
+    best: Ranked,
+    members: Sequence[str],
+    rivals: Sequence[str],
+    floor: NoiseFloor,
 ) -> tuple[Word, str]:
     """The verdict if an effect lowers the error, and its sentence."""
     if explains_little(base, best, floor):
@@ -194,8 +198,10 @@ def _word(
             f"{best.label} and {', '.join(rivals)} explain this recording equally well"
         )
     assert best.fitted is not None
+    others = [label for label in members if label != best.label]
+    alike = f" (or {', '.join(others)}: this recording cannot tell them apart)" if others else ""
     return "missing_effect", (
-        f"{best.label} is missing: the held-out error falls from {base.told_error:.3g} to"
+        f"{best.label}{alike} is missing: the held-out error falls from {base.told_error:.3g} to"
         f" {best.fitted.told_error:.3g} {base.told_in}"
     )
 

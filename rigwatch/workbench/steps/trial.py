@@ -30,10 +30,12 @@ from rigwatch.workbench.ranking import (
 )
 from rigwatch.workbench.steps.kept_holds import with_kept_holds
 from rigwatch.workbench.study import (
+    REFUSED,
     Accepted,
     Study,
     commit,
     drop_effect,
+    refusal,
     stands_on,
     use_variants,
 )
@@ -127,7 +129,8 @@ def try_add(
         row = replace(row, reason=f"{row.reason}; {in_set.reason}")
     supported = row.accepted or (in_set is not None and not in_set.reason)
     if not (supported or anyway):
-        return _refused(study, row, before, f"{_falls(row, before, found)}: {row.reason}")
+        words = f"{_falls(row, before, found)}: {row.reason}"
+        return _refused(study, row, others, before, words)
     accepted = accepted_with_model(row)
     progress(f"refitting with {row.label}")
     changed = with_kept_holds(study, accepted, bench, warm)
@@ -136,7 +139,8 @@ def try_add(
     if supported and not keeps_gain(before.held_out_error, found, again, after.noise_floor):
         supported, row = False, replace(row, reason=f"refitted, it leaves {_told(again, after)}")
         if not anyway:
-            return _refused(study, row, before, f"{_falls(row, before, found)}, but {row.reason}")
+            words = f"{_falls(row, before, found)}, but {row.reason}"
+            return _refused(study, row, others, before, words)
     line = {"parameters": accepted.parameters, "model_parameters": accepted.model}
     line |= _evidence(in_set) | ({} if supported else {"reason": f"added anyway: {row.reason}"})
     errors, text = (after.train_error, again), _falls(row, before, again)
@@ -264,13 +268,15 @@ def accepted_with_model(row: Ranked) -> Accepted:
     return structs.replace(own, model=rest)
 
 
-def _refused(study: Study, row: Ranked, before: Comparison, words: str) -> Trial:
+def _refused(
+    study: Study, row: Ranked, others: Sequence[str], before: Comparison, words: str
+) -> Trial:
     assert row.fitted is not None
     errors = (row.fitted.train_error, row.fitted.held_out_error)
     tried: dict[str, Any] = {"tried_train_error": errors[0], "tried_held_out_error": errors[1]}
     words = f"{words}; not added"
-    change = Change("refused", row.effect, row.port, before, before, errors, words)
-    told = _which(change) | tried
+    change = Change(REFUSED, row.effect, row.port, before, before, errors, words)
+    told = _which(change) | tried | refusal(study, others)
     return Trial(study, study, change, {"reason": row.reason} | _numbers(before) | told)
 
 

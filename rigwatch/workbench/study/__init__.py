@@ -16,6 +16,7 @@ from rigwatch.workbench.study.known_values import assumed_values
 from rigwatch.workbench.study.ledger import append, check_data, commit, lines, model_hash, stands_on
 from rigwatch.workbench.study.moving_parameters import judged_alone
 from rigwatch.workbench.study.recording_parameters import Known
+from rigwatch.workbench.study.refusals import REFUSED, refusal, refusals
 from rigwatch.workbench.study.study import (
     GIVEN,
     HEALTHY,
@@ -38,6 +39,7 @@ __all__ = [
     "LEDGER",
     "NOISES",
     "RECORDINGS",
+    "REFUSED",
     "Accepted",
     "Derive",
     "Derived",
@@ -65,6 +67,8 @@ __all__ = [
     "model_hash",
     "open_study",
     "physics_of",
+    "refusal",
+    "refusals",
     "stands_on",
     "start_study",
     "study_of",

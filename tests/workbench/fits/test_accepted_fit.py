@@ -78,6 +78,28 @@ def test_a_step_that_gets_worse_when_it_is_fitted_again_is_refused(
     assert (study.folder / "study.toml").read_bytes() == before
 
 
+def named(study: Study) -> tuple[str, str]:
+    """The effect that is named as missing, and what is said of the one tried here."""
+    rows, verdict = ranking(open_bench(study))
+    tried = next(row for row in rows if row.label == "constant_force@load")
+    best = verdict.best.label if verdict.best and verdict.word == "missing_effect" else ""
+    return best, tried.reason
+
+
+def test_what_add_refused_is_not_named_again_before_the_study_changes(
+    study: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert named(study)[0] == "constant_force@load"
+    monkeypatch.setattr("rigwatch.workbench.steps.trial.accepted_with_model", accepted_from)
+    assert add(study, "constant_force").step == "refused"
+    best, reason = named(open_study(study.folder))
+    assert best != "constant_force@load"
+    assert reason.startswith("as `add` found: refitted, it leaves 1.9")
+    file = study.folder / "study.toml"
+    file.write_text(file.read_text("utf-8") + "\n# looked at again\n", encoding="utf-8")
+    assert named(open_study(study.folder))[0] == "constant_force@load"
+
+
 @pytest.mark.parametrize(("left", "kept"), [(1.009, True), (1.09, True), (1.2, False)])
 def test_a_refit_must_keep_the_gain_or_end_below_the_floor(left: float, kept: bool) -> None:
     assert keeps_gain(2.0, 1.0, left, floor=0.5) is kept
