@@ -112,12 +112,12 @@ def comparison(bench: Bench) -> Comparison:
 
 
 def _unchanging(bench: Bench) -> list[str]:
-    """Remarks on inputs that never change in the recordings of one kind."""
-    found, data = [], bench.data
+    """Remarks on inputs that could change, and never do in the recordings of one kind."""
+    found, data, model = [], bench.data, bench.study.model
     for use, recording in (("training", data.train), ("held out", data.held_out)):
         still = np.ptp(recording.inputs, axis=0) == 0
-        names = [name for name, at in zip(bench.study.model.inputs, still, strict=True) if at]
-        if names:
+        constant = {name for name, at in zip(model.inputs, still, strict=True) if at}
+        if names := [name for name in model.driving() if name in constant]:
             found.append(
                 f"{use}: {', '.join(names)} never changes; what it does there is a constant"
             )

@@ -22,7 +22,8 @@ class Columns:
         values: by channel, each of shape (n,), in SI; NaN for invalid samples.
         units: of the channels as recorded.
         altered: how the samples differ from what was measured, in words.
-        passed: frequency up to which signals are not low-passed, over the rate.
+        passed: frequency up to which signals keep their noise, over the rate: neither low-passed
+            nor interpolated away.
     """
 
     dt: float

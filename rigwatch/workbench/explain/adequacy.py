@@ -173,7 +173,8 @@ def unchecked(bench: Bench, found: Verdict) -> Verdict:
     certain = periods and best is not None and bench.floor.reached(best.held_out)
     if found.word != "missing_effect" or certain:
         return found
-    return replace(found, word="undetermined", text=f"{found.text}; {UNCHECKED}")
+    text = f"likely, not certain: {found.text}; {UNCHECKED}"
+    return replace(found, word="undetermined", text=text)
 
 
 def _worst(model: Model, ratios: FloatArray) -> str:

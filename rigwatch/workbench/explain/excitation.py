@@ -18,7 +18,7 @@ from rigwatch.wire.errors import RigwatchError
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.data import Data, prepare
 from rigwatch.workbench.explain.verdict import Verdict
-from rigwatch.workbench.fit import Value, fit_base, fit_model, shown, values
+from rigwatch.workbench.fit import NO_INFLUENCE, Value, fit_base, fit_model, shown, values
 from rigwatch.workbench.ranking import Ranked
 from rigwatch.workbench.study import Span, Study
 
@@ -71,6 +71,24 @@ def cannot_tell(bench: Bench, rows: Sequence[Ranked], verdict: Verdict) -> Verdi
         " told; record longer, or more changes of the inputs, or give what is known with --set"
     )
     return Verdict("model_inadequate", None, (), (), text)
+
+
+def with_unjudged_told(bench: Bench, verdict: Verdict) -> Verdict:
+    """The verdict; `nothing_missing` with the parameters of which that says nothing.
+
+    Along the measured motion states drive the model that a free run would have to predict, and what
+    acts on them alone shows in no output.
+    """
+    if verdict.word != "nothing_missing" or not bench.data.along_motion:
+        return verdict
+    idle = [name for name, one in _own(bench).items() if one.note == NO_INFLUENCE]
+    if not idle:
+        return verdict
+    text = (
+        f"; along the measured motion no output depends on {', '.join(idle)}, which is not judged:"
+        ' `prediction = "free"` in the study asks for a free run'
+    )
+    return replace(verdict, text=verdict.text + text)
 
 
 def _own(bench: Bench) -> dict[str, Value]:

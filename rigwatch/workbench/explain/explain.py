@@ -19,7 +19,7 @@ from rigwatch.workbench.explain.adequacy import (
 from rigwatch.workbench.explain.changed_parameters import undetermined_if_parameters_changed
 from rigwatch.workbench.explain.credibility import credible_verdict, unless_refused
 from rigwatch.workbench.explain.exchange import Exchange, exchange
-from rigwatch.workbench.explain.excitation import cannot_tell, unexcited
+from rigwatch.workbench.explain.excitation import cannot_tell, unexcited, with_unjudged_told
 from rigwatch.workbench.explain.explanation import STRENGTH_TOLD, Explanation, explanation
 from rigwatch.workbench.explain.lower_floor import with_lower_floor
 from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
@@ -173,7 +173,7 @@ def _judged(bench: Bench, rows: list[Ranked], progress: Progress) -> tuple[list[
     verdict = cannot_tell(bench, rows, verdict)
     verdict = stopped_by_outliers(bench, verdict)
     verdict = with_base_offered(bench, unchecked(bench, verdict))
-    verdict = with_change_told(bench.study, verdict)
+    verdict = with_unjudged_told(bench, with_change_told(bench.study, verdict))
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
     return rows, verdict

@@ -31,6 +31,7 @@ from rigwatch.workbench.fit.input_hold import (
     with_hold_beside,
 )
 from rigwatch.workbench.fit.intervals import (
+    NO_INFLUENCE,
     Value,
     as_written,
     block_numbers,
@@ -42,6 +43,7 @@ from rigwatch.workbench.fit.intervals import (
 from rigwatch.workbench.fit.profile import profile
 
 __all__ = [
+    "NO_INFLUENCE",
     "Fitted",
     "Value",
     "as_written",

@@ -12,7 +12,7 @@ a stop that is seldom reached, has a variance of few degrees of freedom. Student
 those of each variance, after Satterthwaite for independent residuals (Bell and McCaffrey, 2002).
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,6 +36,8 @@ variances stay finite."""
 PHASES = 20
 """Number of parts of one repetition, each a block."""
 OF_OPENING = "from the first samples of a held-out recording"
+NO_INFLUENCE = "has no influence on this recording"
+"""Remark on a parameter with which no output changes."""
 TIED = 0.98
 """Correlation above which two parameters count as tied."""
 
@@ -232,17 +234,28 @@ def identifiability(fitted: Fit) -> dict[str, str]:
     values, declared = fitted.values(), fitted.compiled.system.parameters
     own = np.array([max(abs(values[n]), abs(declared[n].value)) or 1.0 for n in names])
     notes = {
-        name: "has no influence on this recording"
+        name: NO_INFLUENCE
         for name, size in zip(names, own * sizes, strict=True)
         if size < 1e-12 * max((own * sizes).max(initial=0.0), 1e-300)
     }
-    unit = jacobian / np.where(sizes > 0, sizes, 1.0)
+    seen = [i for i, name in enumerate(names) if name not in notes]
+    return notes | _ties(jacobian[:, seen] / sizes[seen], [names[i] for i in seen])
+
+
+def _ties(unit: FloatArray, names: Sequence[str]) -> dict[str, str]:
+    """Remarks on parameters of which others do the same.
+
+    Args:
+        unit: sensitivities of the error, scaled to length 1, shape (samples, parameters).
+        names: of the parameters.
+    """
+    notes = {}
     together = np.linalg.pinv(unit.T @ unit, rcond=1e-14)
     root = np.sqrt(np.maximum(np.diag(together), 1e-300))
-    correlation = together / np.outer(root, root)
+    correlation = np.minimum(np.abs(together / np.outer(root, root)), 1.0)
     for i, name in enumerate(names):
-        others = np.abs(np.delete(correlation[i], i))
-        if name not in notes and others.size and others.max() > TIED:
+        others = np.delete(correlation[i], i)
+        if others.size and others.max() > TIED:
             partner = [n for n in names if n != name][int(np.argmax(others))]
             notes[name] = f"tied to {partner} (correlation {others.max():.3f})"
     return notes

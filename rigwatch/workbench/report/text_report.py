@@ -11,7 +11,7 @@ from rigwatch.workbench.study import GIVEN, Held
 VERDICTS = {
     "nothing_missing": "nothing is missing",
     "missing_effect": "an effect is missing",
-    "undetermined": "undetermined: this recording cannot tell rivals apart",
+    "undetermined": "undetermined: the recordings do not decide",
     "unknown_effect": "something is missing that no known effect explains",
     "model_inadequate": "the model is inadequate for this recording: no effect is named",
 }

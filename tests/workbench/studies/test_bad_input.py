@@ -186,6 +186,20 @@ def test_parameters_that_cannot_be_distinguished_are_named() -> None:
     assert "tied to" in notes["k"]
 
 
+def test_a_parameter_without_influence_is_tied_to_none() -> None:
+    text = MODEL.replace("k*position", "k*position + 0*(idle + idler)").replace(
+        "parameters.k =",
+        'parameters.idle = { value = 1.0, unit = "N" }\n'
+        'parameters.idler = { value = 1.0, unit = "N" }\nparameters.k =',
+    )
+    system = compose(parse(text, Model, "line"))
+    table = good()
+    recording = Recording(0.01, table["position"][:, None], table["force"][:, None])
+    notes = identifiability(fit(compile_system(system), recording, 100))
+    assert set(notes) == {"idle", "idler"}
+    assert set(notes.values()) == {"has no influence on this recording"}
+
+
 @pytest.mark.parametrize(
     ("times", "missing"),
     [

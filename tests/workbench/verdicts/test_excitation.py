@@ -138,3 +138,45 @@ def test_a_training_too_short_for_every_parameter_says_that_it_cannot_tell(tmp_p
     found = explain(studied(tmp_path, BLOCK, [train], [held_out], units, rates=[0.5, 0.5]))
     assert found.verdict == "model_inadequate"
     assert "determines none of k, tau, Ta" in found.text
+
+
+CORNER = """
+name = "corner"
+summary = "A body on a strut, and a wheel that no channel shows."
+inputs.u = { unit = "m/s^2" }
+states.x = { unit = "m", derivative = "v", measured = "x" }
+states.v = { unit = "m/s", derivative = "u - k*x - c*v + load", rate_of = "x" }
+states.w = { unit = "m", derivative = "(x - w)/T" }
+parameters.k = { value = 80.0, unit = "1/s^2", low = 1.0, high = 1e4 }
+parameters.c = { value = 0.5, unit = "1/s", low = 0.0, high = 1e2 }
+parameters.T = { value = 0.2, unit = "s", low = 0.01, high = 10.0 }
+outputs.x = { unit = "m", expression = "x" }
+outputs.a = { unit = "m/s^2", expression = "u - k*x - c*v + load" }
+[ports.load]
+kind = "force"
+unit = "m/s^2"
+variables.x = { expression = "x", unit = "m" }
+variables.v = { expression = "v", unit = "m/s" }
+"""
+
+
+def driven(seed: int) -> dict[str, np.ndarray]:
+    """The body shaken by a smooth force; semi-implicit steps of 0.5 ms."""
+    generator = np.random.default_rng(seed)
+    time = np.arange(20 * 2000) / 2000
+    u = sum(np.sin(2 * np.pi * f * time + generator.uniform(0, 6)) for f in (0.6, 1.1, 1.7, 2.9))
+    x, v, found = 0.0, 0.0, np.zeros((len(time), 2))
+    for step, push in enumerate(u):
+        a = push - 100.0 * x - 0.8 * v
+        found[step] = x, a
+        v += 5e-4 * a
+        x += 5e-4 * v
+    kept = found[::20] + generator.normal(size=(len(time) // 20, 2)) * [2e-5, 2e-2]
+    return {"u": u[::20], "x": kept[:, 0], "a": kept[:, 1]}
+
+
+def test_nothing_missing_names_what_the_measured_motion_leaves_unjudged(tmp_path: Path) -> None:
+    units = {"u": "m/s^2", "x": "m", "a": "m/s^2"}
+    found = explain(studied(tmp_path, CORNER, [driven(0)], [driven(1)], units))
+    assert found.verdict == "nothing_missing"
+    assert "no output depends on T, which is not judged" in found.text
