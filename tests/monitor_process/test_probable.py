@@ -109,7 +109,9 @@ def test_rivals_of_one_family_leave_the_kind_of_fault_without_doubt() -> None:
     assert "cannot be told" not in settled
     for other in (leak, elsewhere):
         both = replace(best, alike=(law.label, other.label))
-        assert f"{law.label}, {other.label} explain as much in this motion, so check" in in_words([both, law, other])
+        assert f"{law.label}, {other.label} explain as much in this motion, so check" in in_words(
+            [both, law, other]
+        )
     nameless = replace(law, family="")
     alone = replace(best, family="", alike=(law.label,))
     assert "so check these too" in in_words([alone, nameless]), "no family is none in common"

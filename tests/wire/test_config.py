@@ -36,7 +36,8 @@ MISTAKES = [
     ("persistence = 2", "persistence = 0", "rig.toml:22: monitor.alarms.dry_friction.persistence:"
      " found 0, expected a whole number >= 1"),
     ("gain = 1e-6", 'gain = "a"', "rig.toml:12: channels[1].gain: found 'a', expected a number"),
-    ('id = "bench1"', "", "rig.toml:1: rig.id: found no value, expected one: it is required"),
+    ('id = "bench1"', "", "rig.toml:1: rig.id: found no value, expected one: it is required"
+     " (the rig's name on the bus)"),
     ('id = "bench1"', 'id = "a b"', "rig.toml:2: rig.id: found 'a b', expected text matching"
      " '^[A-Za-z0-9_-]+$'"),
     ('"serial"', '"serail"', "rig.toml:15: daq.device.adapter: found 'serail', expected one of"
@@ -48,6 +49,10 @@ MISTAKES = [
      " found [2], expected a whole number"),
     ("[monitor]", "[monitor", "rig.toml:18: found a line that is not TOML (expected ']' at the end"
      " of a table declaration at column 9), expected `key = value` or `[section]`"),
+    ("persistence = 2", "persistence = 2\npersistence = 3", "rig.toml:23: found a key that has a"
+     " value already, expected each key once"),
+    ("[monitor]", "[rig]\n[monitor]", "rig.toml:18: rig: found it a second time, expected all its"
+     " keys in one place: one [section], one line of braces, or dotted keys"),
     ("persistence = 2", "persistence =", "rig.toml:22: found a line that is not TOML (invalid value"
      " at column 14), expected `key = value` or `[section]`"),
 ]  # fmt: skip

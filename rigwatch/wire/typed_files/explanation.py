@@ -49,8 +49,9 @@ def explained(
         key, expected = _below(path, match["key"]), _near(match["key"], schema, value)
         return ConfigError(file, key, "an unknown key", expected, line_of(text, key))
     if match := _MISSING.search(reason):
-        key = _below(path, match["key"])
-        return ConfigError(file, key, "no value", "one: it is required", line_of(text, path))
+        key, meaning = _below(path, match["key"]), _meaning(match["key"], schema, value)
+        expected = "one: it is required" + (f" ({meaning})" if meaning else "")
+        return ConfigError(file, key, "no value", expected, line_of(text, path))
     if isinstance(error.__cause__, UnitError):
         unit, key = error.__cause__, _below(path, "unit")
         return ConfigError(file, key, unit.found, unit.expected, line_of(text, key))
@@ -139,6 +140,12 @@ def _fields(schema: Any, value: Any) -> dict[str, Any]:
     tagged = [s for s in structs if s.tag is not None and value.get(s.tag_field) == s.tag]
     chosen = tagged or [struct for struct in structs if struct.tag is None]
     return {field.encode_name: field.type for struct in chosen for field in struct.fields}
+
+
+def _meaning(key: str, schema: Any, value: Any) -> str:
+    """What the schema says of a key, "" if nothing."""
+    told = getattr(_fields(schema, value).get(key), "extra_json_schema", None) or {}
+    return str(told.get("description", ""))
 
 
 def line_of(text: str, path: str) -> int | None:

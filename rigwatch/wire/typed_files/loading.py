@@ -18,6 +18,8 @@ from rigwatch.wire.typed_files.explanation import explained
 
 S = TypeVar("S", bound="Section")
 LINES = "`key = value` or `[section]`"
+ONE_PLACE = "all its keys in one place: one [section], one line of braces, or dotted keys"
+_TWICE = re.compile(r"Cannot (?:mutate immutable namespace|declare) \((.*)\)(?: twice)?")
 _AT = re.compile(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)")
 
 
@@ -79,6 +81,12 @@ def _malformed(file: Path | str, complaint: str) -> ConfigError:
     if match is None:
         return ConfigError(file, "", complaint, "TOML")
     what, line, column = match.groups()
+    if again := _TWICE.fullmatch(what):
+        table = ".".join(re.findall(r"'([^']*)'", again[1]))
+        return ConfigError(file, table, "it a second time", ONE_PLACE, int(line) if line else None)
+    if what == "Cannot overwrite a value":
+        found = "a key that has a value already"
+        return ConfigError(file, "", found, "each key once", int(line) if line else None)
     place = f"column {column}" if line else "the end"
     found = f"a line that is not TOML ({what[0].lower()}{what[1:]} at {place})"
     return ConfigError(file, "", found, LINES, int(line) if line else None)

@@ -119,7 +119,9 @@ def undetermined_if_much_left(base: Fitted, floor: NoiseFloor, found: Verdict) -
     fitted = found.best.fitted
     if floor.own_error is None:
         left = floor.ratio(fitted.held_out)
-        told = f"{left:.2f} times the error on the healthy recording, expected at most {MUCH:g}"
+        healthy = floor.method in {"healthy", "healthy motion"}
+        of = "error on the healthy recording" if healthy else "noise floor"
+        told = f"{left:.2f} times the {of}, expected at most {MUCH:g}"
     else:
         share = floor.beyond_own_error(base.held_out, fitted.held_out, fitted.calm)
         told = f"{share:.0%} of the error beyond the model's own, expected at most {SHARE:.0%}"
