@@ -21,6 +21,7 @@ from rigwatch.workbench.explain.contradicting import (
     explaining_all,
     explaining_training,
     favoured_by_training,
+    not_refuted,
 )
 from rigwatch.workbench.explain.indistinguishable import (
     as_near_as_own_error,
@@ -162,6 +163,9 @@ def _doubt(
     if others := favoured_by_training(base, best, rows, floor):
         more = f"more of the training error, much of which {best.label} leaves"
         return "undetermined", others, f"{leads}, but {', '.join(others)} explains {more}"
+    if untold := not_refuted(base, best, rows, floor):
+        why = "resembles the residual more, and its fit ended in a local minimum"
+        return "undetermined", untold, f"{leads}, but {', '.join(untold)} {why}"
     return None
 
 
