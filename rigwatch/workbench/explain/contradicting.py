@@ -1,7 +1,7 @@
-"""Effects that other recordings speak for than those held out, where much remains unexplained.
+"""Effects that other evidence speaks for than the recordings held out, where much is left.
 
-Where several effects are missing, the few recordings held out may favour another than the training.
-What leads there is then not named with confidence.
+Where several effects are missing, the few recordings held out may favour another than the training,
+and the fit of the right one may fail. What leads is then not named with confidence.
 """
 
 from collections.abc import Sequence
@@ -111,6 +111,29 @@ def favoured_by_training(
         return much and difference(after.held_out, fitted.held_out).p_rises >= REFUTED
 
     return tuple(row.label for row in rows if _is_another(best, row) and favoured(row))
+
+
+def not_refuted(
+    base: Fitted, best: Ranked, rows: Sequence[Ranked], floor: NoiseFloor
+) -> tuple[str, ...]:
+    """Labels of effects that resemble the residual more than the best does, and whose fits failed.
+
+    An effect can vanish. A fit that leaves more of the training than there is without the effect
+    has ended in a local minimum and tells nothing of it: while the best leaves much, the score that
+    put the other before it is all that is known.
+    """
+    assert best.fitted is not None
+    if floor.reached(best.fitted.held_out) or explains(base, best, floor):
+        return ()
+    risen = (1 + MATERIAL) * base.train_error
+    return tuple(
+        row.label
+        for row in rows
+        if _is_another(best, row)
+        and row.explained > best.explained
+        and row.fitted is not None
+        and row.fitted.train_error > risen
+    )
 
 
 def _explained(base: Fitted, fitted: Fitted) -> float:

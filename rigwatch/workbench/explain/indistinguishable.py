@@ -43,7 +43,7 @@ def undistinguished(
             may favour one of two similar effects, so that neither rules out the other, and it
             may lower the error of an effect with more parameters for no physical reason.
     """
-    members, rivals = [best.label], []
+    members, rivals = [best.label], list[str]()
     for row in rows:
         if row is best:
             continue
@@ -93,6 +93,15 @@ def _at_the_other_end(best: Ranked, row: Ranked, cosine: float) -> bool:
     if (best.kind == "sensor") == (row.kind == "sensor"):
         return False
     return cosine > SAME if row.fitted is None else _as_small(best, row)
+
+
+def as_good(best: Ranked, rows: Sequence[Ranked], members: Sequence[str]) -> list[str]:
+    """Labels of the other members of the best's class that leave no more than a trace more.
+
+    Others belong to it only as long as what else is missing may favour one of them.
+    """
+    others = [row for row in rows if row.label in members and row is not best]
+    return [row.label for row in others if row.fitted is None or _as_small(best, row)]
 
 
 def _as_small(best: Ranked, row: Ranked) -> bool:

@@ -21,8 +21,10 @@ from rigwatch.workbench.explain.contradicting import (
     explaining_all,
     explaining_training,
     favoured_by_training,
+    not_refuted,
 )
 from rigwatch.workbench.explain.indistinguishable import (
+    as_good,
     as_near_as_own_error,
     at_other_ports,
     equal,
@@ -118,7 +120,7 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
     evidence = Evidence(
         floor.left_over(base.held_out, best.fitted.held_out), _margin(best, rows, members + rivals)
     )
-    word, text = _word(base, best, members, rivals, floor)
+    word, text = _word(base, best, as_good(best, rows, members), rivals, floor)
     ahead = None if trusted else _passed_over(best, accepted)
     if word == "missing_effect":
         doubt = _doubt(base, best, ahead, rows, floor, members=members, trusted=trusted)
@@ -162,6 +164,9 @@ def _doubt(
     if others := favoured_by_training(base, best, rows, floor):
         more = f"more of the training error, much of which {best.label} leaves"
         return "undetermined", others, f"{leads}, but {', '.join(others)} explains {more}"
+    if untold := not_refuted(base, best, rows, floor):
+        why = "resembles the residual more, and its fit ended in a local minimum"
+        return "undetermined", untold, f"{leads}, but {', '.join(untold)} {why}"
     return None
 
 
@@ -184,11 +189,17 @@ def _refuse_what_hardly_trains(base: Fitted, rows: Sequence[Ranked]) -> None:
 def _word(
     base: Fitted,
     best: Ranked,
-    members: Sequence[str],
+    others: Sequence[str],
     rivals: Sequence[str],
     floor: NoiseFloor,
 ) -> tuple[Word, str]:
-    """The verdict if an effect lowers the error, and its sentence."""
+    """The verdict if an effect lowers the error, and its sentence.
+
+    Args:
+        base, best, floor: the model, the effect named and the noise floor.
+        others: labels of those of its class that leave as little.
+        rivals: labels of effects of other physics that do as well.
+    """
     if explains_little(base, best, floor):
         return "unknown_effect", (
             f"the best known effect, {best.label}, leaves much of the error above the noise floor"
@@ -198,7 +209,6 @@ def _word(
             f"{best.label} and {', '.join(rivals)} explain this recording equally well"
         )
     assert best.fitted is not None
-    others = [label for label in members if label != best.label]
     alike = f" (or {', '.join(others)}: this recording cannot tell them apart)" if others else ""
     return "missing_effect", (
         f"{best.label}{alike} is missing: the held-out error falls from {base.told_error:.3g} to"

@@ -7,10 +7,15 @@ from rigwatch.workbench.ranking.ranked import Ranked
 LEVEL = 0.01
 """p-value below which an effect is fitted."""
 MOST_FITS = {"static": 24, "dynamic": 6}
+MUCH = 0.25
+"""Share of the residual's energy that an effect must explain, to first order, to be fitted although
+it is not significant."""
 
 
-def select_for_fit(rows: Sequence[Ranked], kind: str, *, at_floor: bool) -> list[Ranked]:
-    """The best significant effects, including the best of each kind of port.
+def select_for_fit(
+    rows: Sequence[Ranked], kind: str, *, at_floor: bool, far: bool = False
+) -> list[Ranked]:
+    """The best likely effects, including the best of each kind of port; marks all that are likely.
 
     Args:
         rows: best first.
@@ -18,8 +23,15 @@ def select_for_fit(rows: Sequence[Ranked], kind: str, *, at_floor: bool) -> list
         at_floor: whether the model leaves only noise. If it leaves more, something is missing, and
             each effect counts that is significant by itself, without the correction for the number
             of candidates: slow residuals have few degrees of freedom, and held-out data decide.
+        far: whether the model leaves so much more than noise that these decide alone where no
+            effect is significant. The slowest residuals, as of a heated block, are then one swing
+            in a window, which noise of any colour might be, and which one effect explains by half.
     """
     likely = [row for row in rows if (row.p_value if at_floor else row.p_alone) < LEVEL]
+    if far and not likely:
+        likely = [row for row in rows if row.explained > MUCH]
+    for row in likely:
+        row.likely = True
     kept_rows: dict[str, Ranked] = {}
     for row in likely:
         similar = _fitted_instead(row, kept_rows, likely)

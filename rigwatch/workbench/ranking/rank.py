@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 
 from rigwatch.workbench.data import Data, NoiseFloor
 from rigwatch.workbench.fit import Fitted, fit_model, fit_with_retry
+from rigwatch.workbench.ranking.acceptance import NEAR
 from rigwatch.workbench.ranking.candidates import candidates
 from rigwatch.workbench.ranking.fit_selection import LEVEL, select_for_fit
 from rigwatch.workbench.ranking.ranked import SAME, Ranked, in_order
@@ -60,7 +61,10 @@ def rank(
             row.reason = row.failure = denied[row.port]
     kind = "dynamic" if study.model.states else "static"
     possible = [row for row in rows if not row.failure]
-    chosen = select_for_fit(possible, kind, at_floor=floor.reached(base.held_out))
+    # Along the motion windows are whole recordings; what a rough model leaves is its own error.
+    free_run = not (data.along_motion or study.model.rough)
+    far = free_run and floor.ratio(base.held_out) > NEAR
+    chosen = select_for_fit(possible, kind, at_floor=floor.reached(base.held_out), far=far)
     enough = fit_each(study, data, base, floor, chosen, progress)
     if not enough:
         least = AGAIN * floor.above(base.train)
@@ -113,7 +117,7 @@ def _simpler_or_equal(
     if best is None or left <= floor.usual:
         return []
     waiting = [r for r in rows if r.fitted is None and not r.failure and not r.fitted_instead]
-    likely = [r for r in waiting if r.port == best.port and r.p_alone < LEVEL]
+    likely = [r for r in waiting if r.port == best.port and _may_be_it(r)]
     return sorted((r for r in likely if r.free <= best.free), key=lambda r: r.p_value)[:MOST_MORE]
 
 
@@ -162,7 +166,12 @@ def _substitutes_of_refused(base: Fitted, rows: Sequence[Ranked]) -> list[Ranked
         return []
     refused = {row.label for row in rows if row.fitted is not None and not row.accepted}
     waiting = [row for row in rows if row.fitted is None and not row.failure]
-    return [r for r in waiting if r.fitted_instead in refused and r.p_alone < LEVEL]
+    return [r for r in waiting if r.fitted_instead in refused and _may_be_it(r)]
+
+
+def _may_be_it(row: Ranked) -> bool:
+    """Whether the score speaks for it: among few each counts that is significant by itself."""
+    return row.likely or row.p_alone < LEVEL
 
 
 def _unfitted_similar(rows: Sequence[Ranked], floor: NoiseFloor) -> Ranked | None:

@@ -25,6 +25,7 @@ class Ranked:
         kind: of the port: force, actuator or sensor.
         p_value: of the score, corrected for the number of candidates.
         p_alone: the same without this correction.
+        likely: whether the score speaks for a fit, see `select_for_fit`.
         explained: share of the training residual's energy that it explains to first order.
         start: initial values of its fit, by the effect's own parameter names.
         alike: effects whose directions on this recording are nearly parallel, as "effect@port".
@@ -56,6 +57,7 @@ class Ranked:
     fitted_instead: str = ""
     vague: bool = False
     p_alone: float = 1.0
+    likely: bool = False
 
     @property
     def effect(self) -> str:

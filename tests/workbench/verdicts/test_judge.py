@@ -359,6 +359,27 @@ def test_a_parameter_more_that_pays_held_out_alone_is_not_named(
     assert found.best.label == named
 
 
+@pytest.mark.parametrize(
+    ("left", "training", "explained", "word"),
+    [
+        pytest.param(1.6, 3.5, 0.6, "undetermined", id="resembles it more, and its fit failed"),
+        pytest.param(1.6, 3.5, 0.4, "missing_effect", id="resembles it less"),
+        pytest.param(1.6, 2.85, 0.6, "missing_effect", id="refused by its fit"),
+        pytest.param(1.05, 3.5, 0.6, "missing_effect", id="nothing is left for it"),
+    ],
+)
+def test_an_effect_whose_fit_failed_is_not_refuted_while_much_is_left(
+    left: float, training: float, explained: float, word: str
+) -> None:
+    only = trained(best(error=left, cosines={"b@x": 0.3}), 1.8)
+    failed = trained(row("b@x", 4.0, accepted=False), training)
+    failed.explained = explained
+    found = judge(replace(base(), train=base(2.9).train), [only, failed], QUIET)
+    assert found.word == word
+    assert found.rivals == (("b@x",) if word == "undetermined" else ())
+    assert ("its fit ended in a local minimum" in found.text) is (word == "undetermined")
+
+
 def test_what_hardly_lowers_the_training_error_is_not_named_with_confidence() -> None:
     near, only = base(1.3), best(error=1.1)
     assert judge(near, [only], QUIET).word == "missing_effect"
