@@ -7,7 +7,7 @@ shown. Alarms are the exception: missed ones are requested from the monitor.
 import time
 from dataclasses import replace
 
-from rigwatch.wire.bus import Bus, Subscription, ask_alarm_list
+from rigwatch.wire.bus import Bus, ShelvedAlarm, Subscription, ask_alarm_list, ask_shelf
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.messages import (
     ALARMS,
@@ -57,6 +57,13 @@ class Feed:
             return ask_alarm_list(self._bus, _ASK_TIMEOUT)
         except BusError:
             return []
+
+    def shelf(self) -> list[ShelvedAlarm] | None:
+        """The shelved alarms, which stand nowhere else; None if no monitor answers."""
+        try:
+            return ask_shelf(self._bus, _ASK_TIMEOUT)
+        except BusError:
+            return None
 
     @property
     def skipped(self) -> int:
