@@ -37,6 +37,7 @@ from rigwatch.wire.delivery import POSITION_WRONG, Item, SampleReader
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.host import (
     MONITOR,
+    NO_ROUTER,
     Heartbeat,
     Kept,
     both_clocks,
@@ -305,7 +306,7 @@ class MonitorProcess:
     def _absence(self, process: str) -> str:
         """Why a process is not seen: without a router nobody is."""
         there = self.bus.connected()
-        return f"the {process} process is not there" if there else "the router does not answer"
+        return f"the {process} process is not there" if there else NO_ROUTER
 
     def _daq_there(self) -> bool:
         now = time.monotonic()

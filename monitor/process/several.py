@@ -33,10 +33,12 @@ from rigwatch.wire.delivery import Item
 from rigwatch.wire.errors import RigwatchError, line_about
 from rigwatch.wire.host import (
     MONITOR,
+    NO_ROUTER,
     Heartbeat,
     prepare_for_real_time,
     raise_priority,
     set_at_signal,
+    waits_of,
 )
 from rigwatch.wire.messages import SampleBlock, pieces
 from rigwatch.wire.rig_config import RigConfig, load_rig
@@ -102,9 +104,9 @@ class Seat:
         return self._before + now
 
     @property
-    def waits(self) -> bool:
-        """Whether there are no samples to come: no bus yet, no daq, or no device."""
-        return self._process is None or bool(self._process.waits())
+    def waits(self) -> str:
+        """Why there are no samples to come: no bus yet, no daq, or no device; else empty."""
+        return NO_ROUTER if self._process is None else self._process.waits()
 
     def has_work(self, now: float) -> bool:
         """Whether something has come, is to be judged, or is due at monotonic time `now` [s];
@@ -282,7 +284,7 @@ def take_turns(
         one_turn(seats, together)
         if began >= tell_at:
             tell_at = began + LOOK_EVERY
-            waits = "no rig has samples to come" if all(seat.waits for seat in seats) else ""
+            waits = waits_of(seat.waits for seat in seats)
             heartbeat.advance(sum(seat.delivered for seat in seats), waits)
         stop.wait(max(0.0, began + TURN - time.monotonic()))
 

@@ -14,6 +14,8 @@ from rigwatch.dashboard.board import APPLICATION, Dashboard, Facts
 from rigwatch.dashboard.feed import Feed
 
 _FLUSH_TIMEOUT = 5.0
+_SHELF_EVERY = 5.0
+"""Time between questions for the shelved alarms [s]."""
 
 
 class Drawer:
@@ -57,8 +59,14 @@ class Drawer:
         dashboard = Dashboard(stream, self.facts)
         for alarm in self._feed.standing() or self.facts.book.standing():
             dashboard.show(alarm)
+        ask_at = 0.0
         while not self._stop.wait(max(0.0, self._period - self.held_for)):
             self._turned_at = time.monotonic()
+            if self._turned_at >= ask_at:
+                # Without a monitor that answers nothing has left the shelf.
+                if (shelf := self._feed.shelf()) is not None:
+                    self.facts.shelf = shelf
+                ask_at = time.monotonic() + _SHELF_EVERY
             for message in self._feed.drain():
                 dashboard.show(message)
             self.facts.skipped, self.facts.lost_alarms = self._feed.skipped, self._feed.lost_alarms

@@ -4,7 +4,10 @@ A screen may skip messages, so nothing is requested again: what a full queue dro
 shown. Alarms are the exception: missed ones are requested from the monitor.
 """
 
-from rigwatch.wire.bus import Bus, Subscription, ask_alarm_list
+import time
+from dataclasses import replace
+
+from rigwatch.wire.bus import Bus, ShelvedAlarm, Subscription, ask_alarm_list, ask_shelf
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.messages import (
     ALARMS,
@@ -15,6 +18,9 @@ from rigwatch.wire.messages import (
     RUN,
     SAMPLES,
     Alarm,
+    Event,
+    Gap,
+    Health,
     Message,
 )
 
@@ -41,7 +47,9 @@ class Feed:
 
     def drain(self) -> list[Message]:
         """All waiting messages, topic by topic; within a topic oldest first."""
-        return [message for waiting in self._subscriptions for message in waiting.drain()]
+        now_ns = time.time_ns()
+        found = (message for waiting in self._subscriptions for message in waiting.drain())
+        return [_at_the_latest(message, now_ns) for message in found]
 
     def standing(self) -> list[Alarm]:
         """Alarms raised before this start; none if no monitor answers."""
@@ -49,6 +57,13 @@ class Feed:
             return ask_alarm_list(self._bus, _ASK_TIMEOUT)
         except BusError:
             return []
+
+    def shelf(self) -> list[ShelvedAlarm] | None:
+        """The shelved alarms, which stand nowhere else; None if no monitor answers."""
+        try:
+            return ask_shelf(self._bus, _ASK_TIMEOUT)
+        except BusError:
+            return None
 
     @property
     def skipped(self) -> int:
@@ -64,3 +79,13 @@ class Feed:
         """Close the subscriptions."""
         for waiting in self._subscriptions:
             waiting.close()
+
+
+def _at_the_latest(message: Message, now_ns: int) -> Message:
+    """What any client may say, drawn now at the latest.
+
+    The screen follows the newest time that is drawn: a message dated ahead would leave it empty.
+    """
+    if isinstance(message, Event | Gap | Health) and message.t_ns > now_ns:
+        return replace(message, t_ns=now_ns)
+    return message

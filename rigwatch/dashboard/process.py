@@ -16,7 +16,7 @@ from rigwatch.dashboard.drawer import Drawer
 from rigwatch.dashboard.feed import Feed
 from rigwatch.dashboard.viewer import Choice, ForeignViewer, Viewer, ViewerError, open_viewer
 from rigwatch.wire.bus import Bus
-from rigwatch.wire.host import Heartbeat
+from rigwatch.wire.host import NO_ROUTER, Heartbeat
 from rigwatch.wire.messages import HEALTH, Health
 from rigwatch.wire.rig_config import DashboardSection
 
@@ -111,7 +111,8 @@ class LiveDashboard:
         return ""
 
     def _tell_supervisor(self) -> None:
-        self._heartbeat.advance(self.facts.samples, "no samples arrive")
+        waits = "no samples arrive" if self._bus.connected() else NO_ROUTER
+        self._heartbeat.advance(self.facts.samples, waits)
 
     def _tell_rig(self) -> None:
         """The dashboard's own health, once a second."""

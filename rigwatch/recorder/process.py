@@ -25,6 +25,7 @@ from rigwatch.recorder.thinning import Thinning
 from rigwatch.wire.bus import Bus, joined
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.host import (
+    NO_ROUTER,
     Heartbeat,
     Kept,
     Pulse,
@@ -184,7 +185,8 @@ def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event, pul
             while not stop.wait(recorder.settings.flush * _OF_FLUSH):
                 kept.check()
                 recorder.turn(time.monotonic(), time.time_ns())
-                pulse.advance(recorder.feed.samples, "no samples arrive")
+                waits = "no samples arrive" if bus.connected() else NO_ROUTER
+                pulse.advance(recorder.feed.samples, waits)
             pulse.stopping()
         finally:
             recorder.close(time.monotonic(), time.time_ns())

@@ -215,7 +215,8 @@ class Supervisor:
         if code is not None:
             self._ended(watched, code, now)
             return
-        complaint = watched.vitals.complaint(self._source(watched), now, self._limits)
+        source, router = self._vitals_of(watched.child.plan.source), self._vitals_of("router")
+        complaint = watched.vitals.complaint(source, now, self._limits, router)
         if complaint:
             self._say(watched, "ill", complaint)
             self._pause(watched, now)
@@ -230,9 +231,10 @@ class Supervisor:
         watched.start_at = now + self._limits.longest_pause
         return False
 
-    def _source(self, watched: Watched) -> Vitals | None:
-        source = self._watched.get(watched.child.plan.source)
-        return source.vitals if source is not None else None
+    def _vitals_of(self, name: str) -> Vitals | None:
+        """Those of a process of this supervisor; None if it has no such process."""
+        found = self._watched.get(name)
+        return found.vitals if found is not None else None
 
     def _ended(self, watched: Watched, code: int, now: float) -> None:
         for line in watched.child.lines():

@@ -2,13 +2,13 @@
 
 Three failures are distinguished: the process never became ready; it is silent, so its loop hangs;
 its loop runs but no sample passes although its source has samples. A process that waits for its
-source is healthy.
+source or its router is healthy.
 """
 
 import math
 from dataclasses import dataclass, field
 
-from rigwatch.wire.host import WAITS
+from rigwatch.wire.host import NO_ROUTER, WAITS
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class Vitals:
         status: its own status line for people.
         reads_device: whether it reads the device itself, and so knows that none is there: a
             simulated one has samples while its cable is unplugged, too.
-        waited_at: when it last said that it waits.
+        waited_at: when it last said that it waits for its router, or for the device it reads.
     """
 
     started_at: float
@@ -84,7 +84,8 @@ class Vitals:
                 self.status = value
             elif name == "X_RIGWATCH_COUNT" and value.isdigit():
                 self._count(int(value), now)
-        if self.status.startswith(WAITS):
+        waits = self.reads_device and self.status.startswith(WAITS)
+        if waits or self.status == WAITS + NO_ROUTER:
             self.waited_at = now
 
     def _is_ready(self, now: float) -> None:
@@ -103,8 +104,26 @@ class Vitals:
         """Whether samples passed in the last second."""
         return self.count > 0 and now - self.advanced_at <= 1.0
 
-    def complaint(self, source: "Vitals | None", now: float, limits: Limits) -> str:
-        """Why the process needs a restart, empty if it does not."""
+    def serves(self, now: float, limits: Limits) -> bool:
+        """Whether it has run for so long that others have taken up their links to it."""
+        return self.ready and now - self.ready_at > limits.stall and now - self.heard_at <= 1.0
+
+    def complaint(
+        self,
+        source: "Vitals | None",
+        now: float,
+        limits: Limits,
+        router: "Vitals | None" = None,
+    ) -> str:
+        """Why the process needs a restart, empty if it does not.
+
+        Args:
+            source: the process whose samples it uses, if it runs here.
+            now: monotonic time [s].
+            limits: of times.
+            router: that of the rig, if it runs here: a process that says that it does not answer
+                is believed while that may be so.
+        """
         if not self.ready:
             late = now - self.started_at > limits.start
             return f"not ready after {limits.start:g} s" if late else ""
@@ -112,7 +131,7 @@ class Vitals:
             return f"hangs: silent for {limits.silence:g} s"
         if source is not None and source.flows(now):
             dry_since = max(self.advanced_at, self.ready_at, source.flowing_since)
-            if self.reads_device:
+            if self.reads_device or router is None or not router.serves(now, limits):
                 dry_since = max(dry_since, self.waited_at)
             if now - dry_since > limits.stall:
                 return f"takes no samples for {limits.stall:g} s while its source has them"

@@ -11,7 +11,6 @@ import pytest
 from monitor.alarms import AlarmJournal, AlarmManager, Occasion
 from monitor.process.operator_desk import OperatorDesk, shelf_of
 from rigwatch.commands.alarms.ack import add_arguments, command_of
-from rigwatch.commands.alarms.alarms import as_shelf_line
 from rigwatch.wire.access import signer_of
 from rigwatch.wire.bus import (
     Bus,
@@ -21,6 +20,7 @@ from rigwatch.wire.bus import (
     command_alarms,
     serve_alarm_list,
     serve_shelf,
+    shelf_line,
 )
 from rigwatch.wire.bus.commands import alarm_command
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
@@ -109,11 +109,11 @@ def test_the_shelf_is_listed_with_who_until_when_and_why(
     assert (one.name, one.user, one.identity) == ("loss", "ann", "not proved")
     assert (one.text, one.active) == ("cable on order", True)
     assert before + HOURS_8_NS <= one.until_ns <= time.time_ns() + HOURS_8_NS
-    line = as_shelf_line(one)
+    line = shelf_line(one)
     assert line.endswith(" by ann: loss, its condition holds: cable on order")
     alarms.report("loss", Occasion("rig", 7, 1, time.time_ns()), active=False)
     (one,) = ask_shelf(screen)
-    assert "its condition does not hold" in as_shelf_line(one)
+    assert "its condition does not hold" in shelf_line(one)
     order("loss", "--unshelve")
     assert ask_shelf(screen) == []
 

@@ -21,8 +21,8 @@ from rigwatch.wire.bus.connection import connect
 from rigwatch.wire.bus.subscription import Subscription
 from rigwatch.wire.bus.zenoh_transport import open_router
 from rigwatch.wire.host.ports import free_port
-from rigwatch.wire.messages.message_types import Alarm, SampleBlock
-from rigwatch.wire.messages.topics import HEALTH, SAMPLES, topic_of
+from rigwatch.wire.messages.message_types import Alarm, Event, Message, SampleBlock
+from rigwatch.wire.messages.topics import EVENTS, HEALTH, SAMPLES, topic_of
 from rigwatch.wire.rig_config import RigConfig, load_rig
 from tests.dashboard.rig_messages import RATE, Rig
 from tests.dashboard.screen import Screen
@@ -173,6 +173,20 @@ def test_a_late_screen_knows_the_alarms_that_stand(bus: Bus) -> None:
     assert [alarm.name for alarm in Feed(bus).standing()] == ["dry_friction"]
     close()
     assert Feed(bus).standing() == []
+
+
+def test_what_a_client_dates_ahead_is_drawn_now(bus: Bus) -> None:
+    feed, now = Feed(bus), time.time_ns()
+    ahead = now + 50 * 365 * 86_400 * 10**9  # the screen would follow it, and be empty
+    bus.publish(EVENTS, Event("eve", ahead, "info", "X", ""))
+    bus.publish(EVENTS, Event("eve", now - 10**9, "info", "Y", ""))
+    found: list[Message] = []
+    eventually(lambda: (found.extend(feed.drain()), len(found) == 2)[1], "both events")
+    feed.close()
+    assert [one.code for one in found if isinstance(one, Event)] == ["X", "Y"]
+    late, old = (one.t_ns for one in found if isinstance(one, Event))
+    assert now <= late <= time.time_ns()
+    assert old == now - 10**9
 
 
 def shows(health: Subscription) -> bool:

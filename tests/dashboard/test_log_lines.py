@@ -12,6 +12,7 @@ from rigwatch.dashboard.board.facts import SILENCE, Facts
 from rigwatch.dashboard.board.log_lines import alarm_level, alarm_line, gap_line
 from rigwatch.dashboard.board.palette import VERDICTS
 from rigwatch.dashboard.board.status import advice, status
+from rigwatch.wire.bus import ShelvedAlarm
 from rigwatch.wire.messages.message_types import (
     PROBABLY_MISSING,
     Alarm,
@@ -121,6 +122,14 @@ def test_age_of_the_picture() -> None:
     facts.tell_time(newest + 40_000_000)
     assert facts.age.now == pytest.approx(40.0)
     assert "| age of newest sample [ms] | 40 | 40 | 40 |" in status(facts)
+
+
+def test_shelved_alarms_are_told_with_whom_and_until_when() -> None:
+    facts = moving()
+    facts.shelf = [ShelvedAlarm("departure", RIG.start_ns, "ann", "proved", "new seal", True)]
+    (line,) = [one for one in status(facts).splitlines() if "shelved" in one]
+    assert line.startswith("* shelved until 20")
+    assert line.endswith("by ann (proved): departure, its condition holds: new seal")
 
 
 def test_status_shows_what_people_ask_for_first() -> None:

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from rigwatch.supervisor.vitals import Limits
 from rigwatch.wire.bus import ask_alarm_list
 from rigwatch.wire.messages import Alarm
 from rigwatch.wire.session import open_session
@@ -118,6 +120,31 @@ def test_41_a_monitor_that_hangs(rig: SupervisedRig) -> None:
 
     least_of(hang, 1.0, lambda: None)
     rig.each_is_judged_once(first)
+
+
+def test_52_a_router_that_stays_away_for_long(rig: SupervisedRig) -> None:
+    rig.goes_on()
+    first, began = rig.device.device.next_seq, time.time()
+    before = [rig.pid(process) for process in ("daq", "monitor", "recorder")]
+    port = int(rig.rig.config.bus.router.rpartition(":")[2])
+    with socket.socket() as taken:
+        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        os.kill(rig.pid("router"), signal.SIGKILL)
+        rig.comes("ended", "router", began)
+        taken.bind(("127.0.0.1", port))
+        # From now on a router that is started cannot listen.
+        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 0)
+        time.sleep(Limits().stall + 2.0)
+        assert not rig.bus.connected()
+        freed = time.time()
+    rig.comes("ready", "router", freed)
+    rig.goes_on()
+    # Nobody was started anew for it: what a monitor has to say would have ended with it.
+    assert [rig.pid(process) for process in ("daq", "monitor", "recorder")] == before
+    rig.each_is_judged_once(first)
+    said = [a for a in rig.alarms if a.name == "link" and a.t_ns >= began * 1e9]
+    assert [a.state for a in said] == ["unacknowledged", "cleared_unacknowledged"]
+    assert said[0].cause.endswith("the router does not answer")
 
 
 def stale_since(rig: SupervisedRig, t_ns: int, count: int) -> list[Alarm]:

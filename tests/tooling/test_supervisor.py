@@ -18,6 +18,7 @@ from rigwatch.supervisor.plan import ProcessPlan
 from rigwatch.supervisor.supervisor import ProcessEvent, Supervisor, how_it_ended
 from rigwatch.supervisor.vitals import Limits, Vitals
 from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.host import NO_ROUTER, WAITS, waits_of
 
 LIMITS = Limits(start=20, silence=1.0, stall=1.5, stop=2, first_pause=0.1, settled=3)
 
@@ -216,6 +217,37 @@ def test_a_process_that_says_its_device_is_gone_is_not_started_again_for_having_
         source.take(f"X_RIGWATCH_COUNT={now * 256:.0f}", now=now)
         daq.take("STATUS=running\nX_RIGWATCH_COUNT=5", now=now)
         assert bool(daq.complaint(source, now, LIMITS)) == (now > seconds[-1] + LIMITS.stall)
+
+
+def test_a_process_that_waits_for_its_router_is_not_started_again_for_having_no_samples() -> None:
+    source, monitor = Vitals(0.0), Vitals(0.0)
+    for vitals in (source, monitor):
+        vitals.take("READY=1\nX_RIGWATCH_COUNT=5", now=1.0)
+    router = Vitals(100.0)  # it starts again, late: what a monitor has to say would end with it
+    router.take("READY=1", now=100.0)
+    seconds = [0.25 * turn for turn in range(8, 500)]
+    ill = []
+    for now in seconds:
+        source.take(f"X_RIGWATCH_COUNT={now * 256:.0f}", now=now)
+        monitor.take(f"STATUS={WAITS}{NO_ROUTER}\nX_RIGWATCH_COUNT=5", now=now)
+        if now > 100.0:
+            router.take("X_RIGWATCH_COUNT=0", now=now)
+        assert monitor.complaint(source, now, LIMITS) == ""  # the router runs elsewhere
+        ill += [now] if monitor.complaint(source, now, LIMITS, router) else []
+    # A router that has run for long does answer: then the fault is the monitor's own.
+    assert min(ill) == 100.0 + LIMITS.stall + 0.25
+
+
+@pytest.mark.parametrize(
+    ("rigs", "waits"),
+    [
+        (["", NO_ROUTER], ""),
+        (["no device", "no device"], "no rig has samples to come"),
+        (["no device", NO_ROUTER], NO_ROUTER),
+    ],
+)
+def test_a_process_of_several_rigs_waits_if_all_of_them_do(rigs: list[str], waits: str) -> None:
+    assert waits_of(rigs) == waits
 
 
 def test_a_process_whose_supervisor_was_killed_while_it_started_does_not_start() -> None:

@@ -16,10 +16,13 @@ from rigwatch.wire.exchange import ImportMapping, import_file
 from rigwatch.wire.messages import encode
 from rigwatch.wire.messages.message_types import (
     Alarm,
+    AlarmCommand,
     AlarmState,
     Column,
     EstimateBlock,
+    Event,
     Gap,
+    Health,
     Message,
     SampleBlock,
 )
@@ -214,6 +217,23 @@ def test_recover_joins_segments(tmp_path: Path) -> None:
     assert written.messages["run"] == 1
     assert written.samples == 310
     assert sum(map(len, open_session(tmp_path / "one.mcap").samples())) == 310
+
+
+def test_what_any_client_may_say_does_not_move_the_times_of_a_session(tmp_path: Path) -> None:
+    ahead = T0 + 50 * 365 * 86_400 * 10**9  # such a session was never old enough to be removed
+    said = [
+        Event("eve", ahead, "info", "X", ""),
+        Event("eve", 0, "info", "X", ""),
+        AlarmCommand("stale", "shelve", "eve", ahead, "", ""),
+        Health("eve", ahead, "running", "", {}),
+        Gap("rig", 7, 5, 5, ahead, "eve", ""),
+    ]
+    summary = summarise(open_session(write(tmp_path / "a.mcap", [samples(0, 257), *said])))
+    assert summary.start_ns == T0
+    assert summary.duration_s == pytest.approx(256 * STEP / 1e9)
+    (tmp_path / "none").mkdir()
+    alone = summarise(open_session(write(tmp_path / "none" / "a.mcap", said[:2])))
+    assert (alone.start_ns, alone.end_ns) == (0, ahead)
 
 
 def test_a_summary_of_nothing_but_a_head(tmp_path: Path) -> None:

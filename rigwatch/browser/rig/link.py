@@ -2,6 +2,7 @@
 
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from rigwatch.wire.bus import (
     Bus,
     CommandAnswer,
     ask_alarm_list,
+    ask_shelf,
     command_alarms,
     connect,
     unique_process,
@@ -68,6 +70,7 @@ class RigLink:
                 "rig": self.config.rig.id,
                 "trouble": self._trouble,
                 "alarms": self._live.alarms(),
+                "shelf": self._live.shelf(),
                 **states,
             }
 
@@ -119,7 +122,7 @@ class RigLink:
         self._say("the rig's router is gone; waiting for it")
 
     def _ask(self, bus: Bus) -> None:
-        """Take the standing alarms: their probable causes are found after they were raised."""
+        """Take the standing alarms, whose probable causes are found late, and the shelved ones."""
         try:
             standing = ask_alarm_list(bus, 0.3)
         except BusError as error:
@@ -128,6 +131,11 @@ class RigLink:
         with self._lock:
             self._live.standing(standing)
             self._trouble = ""
+        # The witness answers for the list without a monitor; then nothing has left the shelf.
+        with suppress(BusError):
+            shelved = ask_shelf(bus, 0.3)
+            with self._lock:
+                self._live.shelve(shelved)
 
     def _say(self, trouble: str) -> None:
         with self._lock:

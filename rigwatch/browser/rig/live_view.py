@@ -2,11 +2,13 @@
 
 import math
 from collections import deque
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.bus import ShelvedAlarm
 from rigwatch.wire.messages import (
     Alarm,
     EstimateBlock,
@@ -48,6 +50,7 @@ class LiveView:
         self._health: dict[str, tuple[Health, float]] = {}
         self._figures: dict[str, float] = {}
         self._heard: dict[str, float] = {}
+        self._shelf: list[ShelvedAlarm] = []
 
     def standing(self, alarms: list[Alarm]) -> None:
         """Take the list of standing alarms, whose causes name what is probably missing."""
@@ -55,6 +58,14 @@ class LiveView:
             known = self._alarms.get(alarm.name)
             if known is None or known.t_ns <= alarm.t_ns:
                 remember(self._alarms, alarm)
+
+    def shelve(self, shelved: list[ShelvedAlarm]) -> None:
+        """Take the list of shelved alarms, which stand nowhere else."""
+        self._shelf = shelved
+
+    def shelf(self) -> list[dict[str, Any]]:
+        """The shelved alarms, the one whose time ends first at the beginning."""
+        return [asdict(one) for one in self._shelf]
 
     def alarm(self, name: str) -> Alarm | None:
         """An alarm by name."""

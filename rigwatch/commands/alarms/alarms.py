@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rigwatch.wire.bus import Bus, ShelvedAlarm, Subscription
+    from rigwatch.wire.bus import Bus, Subscription
     from rigwatch.wire.messages import Alarm
 
 HELP = "list a rig's alarms, or follow them"
@@ -58,23 +58,23 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _print_shelf(bus: "Bus", as_json: bool) -> None:
-    from rigwatch.wire.bus import ask_shelf
+    from rigwatch.wire.bus import ask_shelf, shelf_line
 
     shelved = ask_shelf(bus, TIMEOUT)
     if as_json:
         print(json.dumps([asdict(one) for one in shelved], indent=2))
     else:
-        print("\n".join(map(as_shelf_line, shelved)) or "no shelved alarms")
+        print("\n".join(map(shelf_line, shelved)) or "no shelved alarms")
 
 
 def _print_shelved(bus: "Bus") -> None:
     """What is not announced, below what is; nothing where only the witness is there to answer."""
-    from rigwatch.wire.bus import ask_shelf
+    from rigwatch.wire.bus import ask_shelf, shelf_line
     from rigwatch.wire.errors import BusError
 
     with contextlib.suppress(BusError):
         for one in ask_shelf(bus, TIMEOUT):
-            print(as_shelf_line(one))
+            print(shelf_line(one))
 
 
 def _follow(standing: "list[Alarm]", changes: "Subscription", as_json: bool) -> None:
@@ -105,22 +105,6 @@ def as_line(alarm: "Alarm") -> str:
     who = f" by {alarm.user}{proved}" if alarm.user else ""
     state = alarm.state.replace("_", " ")
     return f"{when:%Y-%m-%d %H:%M:%S} {alarm.severity:8} {alarm.name}: {state}{who}{mark}"
-
-
-def as_shelf_line(shelved: "ShelvedAlarm") -> str:
-    """One line: the alarm, until when and by whom it is shelved, its condition, the remark."""
-    from datetime import datetime
-
-    from rigwatch.wire.messages import PROVED
-
-    until = datetime.fromtimestamp(shelved.until_ns / 1e9).astimezone()
-    proved = " (proved)" if shelved.identity == PROVED else ""
-    holds = "its condition holds" if shelved.active else "its condition does not hold"
-    why = f": {shelved.text}" if shelved.text else ""
-    return (
-        f"shelved until {until:%Y-%m-%d %H:%M:%S} by {shelved.user}{proved}: {shelved.name}, "
-        f"{holds}{why}"
-    )
 
 
 def as_text(alarm: "Alarm", config: Path) -> str:

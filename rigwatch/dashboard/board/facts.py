@@ -7,6 +7,7 @@ import numpy as np
 
 from rigwatch.dashboard.board.alarm_book import LANES, AlarmBook
 from rigwatch.dashboard.board.palette import VERDICTS
+from rigwatch.wire.bus import ShelvedAlarm
 from rigwatch.wire.messages import EstimateBlock, Health, SampleBlock
 
 SILENCE = 2.0
@@ -36,6 +37,7 @@ class Facts:
     Attributes:
         rig: the rig's id.
         book: states of the alarms.
+        shelf: the shelved alarms; live only.
         health: last health message of each process, by source.
         figures: last value of each estimate, by column name.
         age: age of the newest sample drawn; live only.
@@ -49,6 +51,7 @@ class Facts:
 
     rig: str
     book: AlarmBook = field(default_factory=AlarmBook)
+    shelf: list[ShelvedAlarm] = field(default_factory=list)
     health: dict[str, Health] = field(default_factory=dict)
     figures: dict[str, float] = field(default_factory=dict)
     age: Age = field(default_factory=Age)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from rigwatch.dashboard.board.alarm_book import title
 from rigwatch.dashboard.board.facts import Facts
+from rigwatch.wire.bus import shelf_line
 from rigwatch.wire.messages import Alarm
 
 _UNITS = {"hz": "Hz", "ms": "ms", "us": "µs", "ppm": "ppm", "s": "s"}
@@ -39,6 +40,7 @@ def status(facts: Facts) -> str:
         )
     complaints = [f"* {h.source}: {h.state}, {h.text}" for h in facts.health.values() if h.text]
     complaints += [f"* cleared, not acknowledged: {title(a.name)}" for a in facts.book.unseen()]
+    complaints += [f"* {shelf_line(one)}" for one in facts.shelf]
     if facts.skipped:
         complaints.append(f"* this screen skipped {facts.skipped} messages to keep up")
     if facts.lost_alarms:

@@ -31,6 +31,7 @@ from rigwatch.wire.bus.commands import (
     proved_here,
     serve_alarm_list,
     serve_shelf,
+    shelf_line,
 )
 from rigwatch.wire.bus.complete_subscription import CompleteSubscription, Place
 from rigwatch.wire.bus.connection import (
@@ -89,5 +90,6 @@ __all__ = [
     "proved_here",
     "serve_alarm_list",
     "serve_shelf",
+    "shelf_line",
     "unique_process",
 ]

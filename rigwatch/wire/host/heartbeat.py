@@ -17,14 +17,25 @@ import contextlib
 import os
 import socket
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 INTERVAL = 0.25
 """Shortest time between two notifications [s]."""
 WAITS = "waits: "
 """What the status of a process begins with that waits for others."""
+NO_ROUTER = "the router does not answer"
+"""What a process says that waits for its router: no start of it anew would bring that back, and
+what it has to say to others would be lost."""
 WAITS_AFTER = 5.0
 """Time without samples after which a process says that it waits [s]."""
+
+
+def waits_of(rigs: Iterable[str]) -> str:
+    """What a process waits for whose rigs wait for these; empty if one of them does not wait."""
+    found = list(rigs)
+    if not all(found):
+        return ""
+    return NO_ROUTER if NO_ROUTER in found else "no rig has samples to come"
 
 
 class Heartbeat:

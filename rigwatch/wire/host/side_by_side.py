@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from rigwatch.wire.errors import line_about
-from rigwatch.wire.host.heartbeat import Heartbeat
+from rigwatch.wire.host.heartbeat import Heartbeat, waits_of
 
 BEAT = 0.2
 """Time between two checks of the rigs [s]."""
@@ -179,8 +179,7 @@ def run_side_by_side(
                 part.renew()
         for part in parts:
             part.check()
-        waits = "no rig has samples to come" if all(part.waits for part in parts) else ""
-        heartbeat.advance(sum(part.count for part in parts), waits)
+        heartbeat.advance(sum(part.count for part in parts), waits_of(p.waits for p in parts))
     heartbeat.stopping()
     for part in parts:
         part.stop()

@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import (
     Alarm,
+    AlarmCommand,
     Column,
     EstimateBlock,
+    Event,
     Gap,
+    Health,
     Message,
     RunInfo,
     SampleBlock,
@@ -69,7 +72,8 @@ class Summary:
 
     Attributes:
         run: description of the run, None if lost.
-        start_ns, end_ns: times of the first and last message [ns], 0 if there is none.
+        start_ns, end_ns: times of the first and last sample, estimate, alarm or change of the
+            model; where there is none, of any other message; 0 if there is none either [ns].
         topics: messages per topic.
         unknown_ends: starts of a device whose last samples are missing, number unknown.
         lost_messages: missing messages per topic, for example alarms no longer in any ring.
@@ -96,6 +100,12 @@ class Summary:
         return (self.end_ns - self.start_ns) / 1e9
 
 
+_SAID_BY_ANYBODY = (AlarmCommand, Event, Gap, Health)
+"""Messages that every client of a bus may send: with the time of one dated fifty years ahead, a
+session would never be old enough to be removed.
+"""
+
+
 def summarise(session: Session, also: Callable[[Message], None] | None = None) -> Summary:
     """Summarise the whole session.
 
@@ -108,6 +118,7 @@ def summarise(session: Session, also: Callable[[Message], None] | None = None) -
     """
     summary = Summary(str(session.path), len(session.segments))
     devices: dict[str, _Device] = {}
+    times, others = _Times(), _Times()
     counts: Counter[str] = Counter()
     losses = Losses()
     for item in session.messages():
@@ -122,7 +133,9 @@ def summarise(session: Session, also: Callable[[Message], None] | None = None) -
             summary.alarms.append(message)
         elif isinstance(message, Gap):
             losses.add(message)
-        _extend(summary, message)
+        if not isinstance(message, RunInfo):  # it may be years older
+            (others if isinstance(message, _SAID_BY_ANYBODY) else times).add(message)
+    summary.start_ns, summary.end_ns = (times if times.any else others).span
     summary.topics = dict(sorted(counts.items()))
     summary.devices = [
         # A start whose samples are all missing has no device but the only one there is.
@@ -143,15 +156,21 @@ def _run(session: Session) -> RunInfo | None:
         return None
 
 
-def _extend(summary: Summary, message: Message) -> None:
-    """Extend the time span; the description of the run is excluded, it may be years older."""
-    if isinstance(message, RunInfo):
-        return
-    first = last = message_time(message)
-    if isinstance(message, SampleBlock | EstimateBlock):
-        last = int(message.t_ns[-1]) if len(message) else first
-    summary.start_ns = first if not summary.end_ns else min(summary.start_ns, first)
-    summary.end_ns = max(summary.end_ns, last)
+class _Times:
+    """The time span of some messages."""
+
+    def __init__(self) -> None:
+        self.any = False
+        self.span = 0, 0
+        """Times of the first and the last of them [ns]."""
+
+    def add(self, message: Message) -> None:
+        first = last = message_time(message)
+        if isinstance(message, SampleBlock | EstimateBlock):
+            last = int(message.t_ns[-1]) if len(message) else first
+        start, end = self.span
+        self.span = (min(start, first), max(end, last)) if self.any else (first, last)
+        self.any = True
 
 
 class _Device:

@@ -9,6 +9,7 @@ const kept = { samples: { times: [], lines: {} }, estimates: { times: [], lines:
 let seconds = 20;
 let units = {};
 let shown = "";
+let shelved = "";
 let paused = false;
 let status = null;
 let old = ""; // why the figures are old
@@ -130,6 +131,15 @@ function alarms(found) {
   say(standing.length ? `alarms: ${standing.join(", ")}` : "no active alarms");
 }
 
+/** Shelved alarms are announced nowhere: here is what is kept quiet, until when and by whom. */
+function shelf(found) {
+  const now = JSON.stringify(found);
+  if (now === shelved) return;
+  shelved = now;
+  const lines = found.map((one) => element("li", `${plain(one.name)} until ${since(one.until_ns)}, by ${one.user}${one.identity === "proved" ? " (proved)" : ""}${one.active ? "; its condition holds" : ""}${one.text ? `: ${one.text}` : ""}`, { "data-shelved": one.name }));
+  $("shelf").replaceChildren(...(lines.length ? [element("h3", "Shelved"), element("ul", "", { class: "note" }, ...lines)] : []));
+}
+
 function alarm(one) {
   const item = element("article", "", { class: `alarm ${one.state}`, "data-alarm": one.name, "data-state": one.state });
   item.append(element("h3", plain(one.name)), element("p", `${one.severity}, ${one.state === "normal" ? "cleared" : plain(one.state)}, since ${since(one.t_ns)}${one.first_out ? ", first-out" : ""}${one.user ? `, by ${one.user}` : ""}`, { class: "note" }));
@@ -194,7 +204,7 @@ async function rollback() {
 }
 
 function heard(kind, content) {
-  if (kind === "status") { status = content; states(); alarms(status.alarms); return; }
+  if (kind === "status") { status = content; states(); alarms(status.alarms); shelf(status.shelf); return; }
   ({ units, seconds } = content);
   for (const one of Object.keys(kept)) take(one, content.signals[one]);
   if (!paused) draw();

@@ -18,7 +18,7 @@ from rigwatch.wire.bus.commands.device_request import DeviceReply, DeviceRequest
 from rigwatch.wire.bus.commands.model_change import KEY, PATIENCE, ask_for_model
 from rigwatch.wire.bus.commands.model_request import ModelReply, ModelRequest
 from rigwatch.wire.bus.commands.refusal import marked
-from rigwatch.wire.bus.commands.shelf import ShelvedAlarm, ask_shelf, serve_shelf
+from rigwatch.wire.bus.commands.shelf import ShelvedAlarm, ask_shelf, serve_shelf, shelf_line
 
 __all__ = [
     "DEVICE_KEY",
@@ -44,4 +44,5 @@ __all__ = [
     "proved_here",
     "serve_alarm_list",
     "serve_shelf",
+    "shelf_line",
 ]

@@ -2,13 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 
 import msgspec
 
 from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.bus.commands.alarm_list import no_monitor
 from rigwatch.wire.bus.transport import Close
-from rigwatch.wire.messages import Identity
+from rigwatch.wire.messages import PROVED, Identity
 from rigwatch.wire.typed_files import JsonError, json_value
 
 SHELF_KEY = "monitor/shelf"
@@ -33,6 +34,18 @@ class ShelvedAlarm:
     identity: Identity
     text: str
     active: bool
+
+
+def shelf_line(shelved: ShelvedAlarm) -> str:
+    """One line: until when and by whom it is shelved, the alarm, its condition, the remark."""
+    until = datetime.fromtimestamp(shelved.until_ns / 1e9).astimezone()
+    proved = " (proved)" if shelved.identity == PROVED else ""
+    holds = "its condition holds" if shelved.active else "its condition does not hold"
+    why = f": {shelved.text}" if shelved.text else ""
+    return (
+        f"shelved until {until:%Y-%m-%d %H:%M:%S} by {shelved.user}{proved}: {shelved.name}, "
+        f"{holds}{why}"
+    )
 
 
 def serve_shelf(bus: Bus, shelved: Callable[[], Sequence[ShelvedAlarm]]) -> Close:
