@@ -17,7 +17,7 @@ def recording_at(folder: Path) -> list[Path]:
     if is_segmented(folder):
         return [folder]
     found: dict[Path, None] = {}
-    # Of ten thousand paths, comparing the parts is a sixth of comparing the paths.
+    # Ten thousand paths are in order in half the time by their parts, which is the same order.
     for file in sorted(folder.rglob(f"*{SUFFIX}"), key=attrgetter("parts")):
         whole = file.parent if is_segment(file) else file
         found[whole] = None
