@@ -116,7 +116,7 @@ def track(run: Validation, friction: FrictionFilter) -> Track:
     y = counts * _residual(run)
     part = slice(HEAD, run.time.size - TAIL)
     theta = np.empty((run.time[part].size, 2))
-    windowed_least_squares(new_window(WINDOW, 2), g1[part], g2[part], y[part], theta)
+    windowed_least_squares(new_window(WINDOW), g1[part], g2[part], y[part], theta)
     ends = np.arange(WINDOW, len(theta) + 1, HOP) - 1
     estimates = theta[ends]
     healthy = estimates[:HEALTHY_ESTIMATES]

@@ -27,7 +27,7 @@ CASES = ROOT / "tests" / "verify" / "cases.toml"
 FLUSH = 102
 """Samples in one flush of the recorder: 0.4 s."""
 REPEATS = 3
-LEAST_SPEED = 2000.0
+LEAST_SPEED = 10_000.0
 ROOM = 16.0
 """A longer recording may take this much more memory before it counts as growth [MiB]."""
 

@@ -35,7 +35,7 @@ def ours(g: Floats, y: Floats) -> Floats:
     """θ after each sample, shape (n, 2)."""
     theta = np.empty((y.size, 2))
     g1, g2 = np.ascontiguousarray(g[:, 0]), np.ascontiguousarray(g[:, 1])
-    windowed_least_squares(new_window(WINDOW, 2), g1, g2, y, theta)
+    windowed_least_squares(new_window(WINDOW), g1, g2, y, theta)
     return theta
 
 

@@ -9,7 +9,6 @@ own channel, and not every fault shows in the estimates.
 
 import numpy as np
 
-from monitor.decision.estimates import spread_of_change
 from monitor.decision.kernel_state import (
     DEVIATION,
     LONG,
@@ -31,6 +30,8 @@ from rigwatch.wire.kernel import part
 
 _NOISES = 6.0
 """Rms over a window that noise alone does not exceed, in standard deviations of the channel."""
+_CLEARLY = 1.0 - 1e-9
+"""Share of a value below which another one is smaller whatever the rounding of both."""
 
 
 @part(inline="always")
@@ -56,18 +57,28 @@ def voltage_limit(rules: Rules, ref: Reference) -> float:
 
 
 @part(inline="always")
-def departed(rules: Rules, ref: Reference, state: WatchState) -> bool:
-    """Whether any statistic exceeds its limit; stores the largest as deviation, in units of k."""
+def departed(spread: float, rules: Rules, ref: Reference, state: WatchState) -> bool:
+    """Whether any statistic exceeds its limit; stores the largest as deviation, in units of k.
+
+    Args:
+        spread: `spread_of_change` [m/s^2].
+        rules, ref, state: of the rig.
+    """
     held, energies = state.held, state.energies
     if ref.counts.source == FIXED:
         return held[DEVIATION] > rules.factor
-    variance = spread_of_change(ref) ** 2
-    largest = held[DEVIATION] / rules.factor
-    largest = max(largest, np.sqrt(recent_energy(energies, Y, SHORT) / variance / rules.limit_8))
+    variance = spread**2
+    # Roots and divisions take most of a sample's time: of two squares the larger one has the larger
+    # root, and a position well within its limit does not need one.
+    square = recent_energy(energies, Y, SHORT) / variance / rules.limit_8
     if energies.place[FILL] >= LONG:
-        largest = max(largest, np.sqrt(energy(energies, Y) / variance / rules.limit_64))
+        square = max(square, energy(energies, Y) / variance / rules.limit_64)
+    largest = max(held[DEVIATION] / rules.factor, np.sqrt(square))
     if ref.counts.source != APERIODIC:
-        largest = max(largest, moved(energies, X, LONG) / position_limit(rules, ref))
+        limit = position_limit(rules, ref)
+        reach = _CLEARLY * largest * limit
+        if energy(energies, X) > reach * reach * energies.place[FILL]:
+            largest = max(largest, moved(energies, X, LONG) / limit)
         voltage = moved(energies, V, LONG)
         held[MOVED_VOLTAGE] = voltage / max(ref.levels.swing, 1e-12)
         largest = max(largest, voltage / voltage_limit(rules, ref))

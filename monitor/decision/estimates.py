@@ -67,8 +67,10 @@ def _stands(ref: Reference, state: WatchState) -> bool:
 
 
 @part(inline="always")
-def estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
-    """Write θ, its limits, D and the observability of friction to `state.held`."""
+def estimate(spread: float, rules: Rules, ref: Reference, state: WatchState) -> None:
+    """Write θ, its limits, D and the observability of friction to `state.held`; `spread` is
+    `spread_of_change`.
+    """
     held, s = state.held, state.sums
     sums(state.window, s)
     theta1, theta2, condition = solve_two(s)
@@ -82,7 +84,6 @@ def estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
     if not observable or not condition < rules.worst_condition:
         held[DEVIATION] = 0.0
         return
-    spread = spread_of_change(ref)
     determinant = s[0] * s[3] - s[1] * s[1]
     # Standard deviations of the estimates for white noise, from the inverse normal matrix.
     reach1 = rules.factor * spread * np.sqrt(s[3] / determinant)

@@ -10,6 +10,7 @@ import numpy as np
 
 from monitor.decision.isolation import History, new_history
 from monitor.estimation import (
+    SIGNALS,
     Energies,
     Window,
     new_energies,
@@ -92,13 +93,13 @@ def new_watch_state(
         friction_b, friction_a: friction filter Ge, padded to equal length.
     """
     return WatchState(
-        new_window(longest_window, 2),
-        new_energies(LONG, 5),
+        new_window(longest_window),
+        new_energies(LONG),
         new_history(friction_b, friction_a),
         new_record(_COUNTS),
         np.zeros(OUTPUTS),
         np.zeros(10),
-        np.zeros(5),
+        np.zeros(SIGNALS),
         np.zeros(3),
         np.zeros(6),
     )

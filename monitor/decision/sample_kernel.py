@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from monitor.decision.departure import departed
 from monitor.decision.episode import PLAINLY_HEALTHY, follow
-from monitor.decision.estimates import estimate
+from monitor.decision.estimates import estimate, spread_of_change
 from monitor.decision.isolation import HISTORY, store_sample
 from monitor.decision.kernel_state import (  # fmt: skip
     ARMED_FLAG,
@@ -147,12 +147,13 @@ def _judge(  # noqa: PLR0917
         _skip(state)
         return
     _take(data, place, position_valid, ref, state)
+    spread = spread_of_change(ref)
     # Sums are updated by every sample, the least squares are solved every `hop` samples.
     state.counts.hop += 1
     if state.counts.hop >= rules.hop:
         state.counts.hop = 0
-        estimate(rules, ref, state)
-    follow(departed(rules, ref, state), seq, place, data, rules, ref, state)
+        estimate(spread, rules, ref, state)
+    follow(departed(spread, rules, ref, state), seq, place, data, rules, ref, state)
 
 
 @part(inline="always")

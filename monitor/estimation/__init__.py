@@ -1,6 +1,7 @@
 """Windowed sums behind the estimates (5.33)-(5.39), exact for any length of the run."""
 
 from monitor.estimation.energies import (
+    SIGNALS,
     Energies,
     add,
     energy,
@@ -22,6 +23,7 @@ from monitor.estimation.window import (
 __all__ = [
     "FILL",
     "LENGTH",
+    "SIGNALS",
     "Energies",
     "Window",
     "add",

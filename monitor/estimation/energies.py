@@ -13,10 +13,14 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import part
 
 HEAD, FILL, FRONT_LEFT = 0, 1, 2
+SIGNALS = 5
+"""Signals of a sample. A constant, so that loops over them are written out."""
 
 
 class Energies(NamedTuple):
-    """Squares of several signals: ring (N, k), suffix sums (N + 1, k), running sum (k,), places."""
+    """Squares of several signals: ring (N, SIGNALS), suffix sums (N + 1, SIGNALS), running sum
+    (SIGNALS,), places.
+    """
 
     rows: FloatArray
     front: FloatArray
@@ -24,12 +28,12 @@ class Energies(NamedTuple):
     place: NDArray[np.int64]
 
 
-def new_energies(length: int, signals: int) -> Energies:
-    """An empty window over `length` samples of `signals` signals."""
+def new_energies(length: int) -> Energies:
+    """An empty window over `length` samples."""
     return Energies(
-        np.zeros((length, signals)),
-        np.zeros((length + 1, signals)),
-        np.zeros(signals),
+        np.zeros((length, SIGNALS)),
+        np.zeros((length + 1, SIGNALS)),
+        np.zeros(SIGNALS),
         np.zeros(3, np.int64),
     )
 
@@ -47,20 +51,21 @@ def restart_energies(energies: Energies) -> None:
 def add(energies: Energies, signals: FloatArray) -> None:
     """Add the squares of one sample's signals and remove the oldest."""
     rows, front, back, place = energies
-    length, width = rows.shape
-    head = place[HEAD]
+    length, head = rows.shape[0], place[HEAD]
     if place[FILL] == length:
         if place[FRONT_LEFT] == 0:
             for n in range(length):
-                at = (head - 1 - n) % length
-                for i in range(width):
+                at = head - 1 - n
+                if at < 0:
+                    at += length
+                for i in range(SIGNALS):
                     front[n + 1, i] = front[n, i] + rows[at, i]
             fill(back, 0.0)
             place[FRONT_LEFT] = length
         place[FRONT_LEFT] -= 1
     else:
         place[FILL] += 1
-    for i in range(width):
+    for i in range(SIGNALS):
         rows[head, i] = signals[i] * signals[i]
         back[i] += rows[head, i]
     place[HEAD] = head + 1 if head + 1 < length else 0

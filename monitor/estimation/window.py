@@ -8,7 +8,7 @@ the running sum of the newer samples, `front[i]` the sum of the older ones from 
 recomputed from the stored samples. A spike therefore leaves no trace, to the last bit, at constant
 average cost per sample.
 
-Rows are (g1 … gp, y); the sums are those of all products of two entries, upper triangle row by row.
+Rows are (g1, g2, y); the sums are those of all products of two entries, upper triangle row by row.
 A row that must not count (an invalid sample) is pushed as zeros, so the window keeps its length in
 time.
 """
@@ -22,15 +22,18 @@ from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.kernel import kernel, part
 
 HEAD, FILL, FRONT_LEFT, LENGTH = 0, 1, 2, 3
+WIDTH = 3
+"""Entries of a row: two regressors and y. A constant, so that loops over them are written out."""
+SUMS = WIDTH * (WIDTH + 1) // 2
 
 
 class Window(NamedTuple):
     """State of one sliding window.
 
     Args:
-        rows: ring of the stored rows, shape (N, p + 1).
-        front: sums of the older samples, shape (N + 1, m), m = (p + 1)(p + 2)/2.
-        back: sum of the newer samples, shape (m,).
+        rows: ring of the stored rows, shape (N, WIDTH).
+        front: sums of the older samples, shape (N + 1, SUMS).
+        back: sum of the newer samples, shape (SUMS,).
         place: head of the ring, samples in it, older samples left in `front`, N itself.
     """
 
@@ -40,14 +43,12 @@ class Window(NamedTuple):
     place: IntArray
 
 
-def new_window(length: int, parameters: int) -> Window:
-    """An empty window over `length` samples for `parameters` regressors."""
-    width = parameters + 1
-    sums = width * (width + 1) // 2
+def new_window(length: int) -> Window:
+    """An empty window over `length` samples."""
     return Window(
-        np.zeros((length, width)),
-        np.zeros((length + 1, sums)),
-        np.zeros(sums),
+        np.zeros((length, WIDTH)),
+        np.zeros((length + 1, SUMS)),
+        np.zeros(SUMS),
         np.array([0, 0, 0, length], np.int64),
     )
 
@@ -67,8 +68,7 @@ def restart_window(window: Window, length: int) -> None:
 def push(window: Window, row: FloatArray) -> None:
     """Add one row, and remove the oldest if the window is full."""
     rows, _, back, place = window
-    width, length = rows.shape[1], place[LENGTH]
-    head = place[HEAD]
+    length, head = place[LENGTH], place[HEAD]
     if place[FILL] == length:
         if place[FRONT_LEFT] == 0:
             _refill(window)
@@ -76,9 +76,9 @@ def push(window: Window, row: FloatArray) -> None:
     else:
         place[FILL] += 1
     k = 0
-    for i in range(width):
+    for i in range(WIDTH):
         rows[head, i] = row[i]
-        for j in range(i, width):
+        for j in range(i, WIDTH):
             back[k] += row[i] * row[j]
             k += 1
     place[HEAD] = head + 1 if head + 1 < length else 0
@@ -88,7 +88,7 @@ def push(window: Window, row: FloatArray) -> None:
 def _refill(window: Window) -> None:
     """Move everything from `back` to `front`: suffix sums from the newest sample to the oldest."""
     rows, front, back, place = window
-    width, length = rows.shape[1], place[LENGTH]
+    length = place[LENGTH]
     newest = place[HEAD] - 1
     fill(front[0], 0.0)
     for n in range(length):
@@ -96,8 +96,8 @@ def _refill(window: Window) -> None:
         if at < 0:
             at += length
         k = 0
-        for i in range(width):
-            for j in range(i, width):
+        for i in range(WIDTH):
+            for j in range(i, WIDTH):
                 front[n + 1, k] = front[n, k] + rows[at, i] * rows[at, j]
                 k += 1
     fill(back, 0.0)
@@ -106,9 +106,9 @@ def _refill(window: Window) -> None:
 
 @part(inline="always")
 def sums(window: Window, out: FloatArray) -> None:
-    """Sums of products over the window into `out`, shape (m,)."""
+    """Sums of products over the window into `out`, shape (SUMS,)."""
     _, front, back, place = window
-    for k in range(back.size):
+    for k in range(SUMS):
         out[k] = front[place[FRONT_LEFT], k] + back[k]
 
 

@@ -148,8 +148,8 @@ def _copy(source: _States, to: _States) -> None:
 
 @part()
 def _within_limits(row: FloatArray) -> bool:
-    for value in row:  # noqa: SIM110 (no generators in a compiled kernel)
-        if not abs(value) <= LARGEST:  # also false for NaN
+    for c in range(len(COLUMNS)):  # noqa: SIM110 (no generators in a compiled kernel)
+        if not abs(row[c]) <= LARGEST:  # also false for NaN
             return False
     return True
 

@@ -10,6 +10,7 @@ wrong wiring would count as healthy. From the first bad window on nothing is jud
 good one; it takes the second to be told. What a person has accepted, which the model says, passes.
 """
 
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -19,7 +20,7 @@ from monitor.signals import Condition, above, usable
 from monitor.wiring.drive_ratio import ModelledDrive, drive_ratio
 from monitor.wiring.motion_ratio import MotionRatio, motion_ratio
 from rigwatch.wire.arrays import BoolArray, FloatArray
-from rigwatch.wire.messages import SampleBlock
+from rigwatch.wire.messages import SampleBlock, cut
 from rigwatch.wire.wiring_names import WIRING, Wiring
 
 WINDOW = 1.0
@@ -73,7 +74,7 @@ class WiringCheck:
 
     def _forget(self) -> None:
         """The next sample does not follow the last one."""
-        self._window: list[FloatArray] = []
+        self._window: list[FloatArray] = []  # stretches of samples
         self._settled = False
         if self._drive is not None:
             self._drive.restart()
@@ -117,24 +118,45 @@ class WiringCheck:
         """
         if self._failed:
             return 0
-        signals = self._signals(block)
-        if signals is None:
-            self._passed = True
-            return len(block)
+        # One window passes as a rule, so no more of a long block is read than is asked for.
+        for begin in range(0, len(block), self._length):
+            end = min(begin + self._length, len(block))
+            signals = self._signals(cut(block, begin, end))
+            if signals is None:
+                self._passed = True
+                break
+            at = self._collect(signals, doubted[begin:end])
+            if self._failed:
+                return begin + at
+            if self._passed:
+                break
+        return len(block)
+
+    def _collect(self, signals: FloatArray, doubted: BoolArray) -> int:
+        """Judge each window that these samples complete, until one passes or the wiring is wrong.
+
+        Returns that window's last sample, if there is one.
+        """
         known: BoolArray = np.isfinite(signals[:, :2].sum(axis=1))
-        for n, valid in enumerate(known):
-            doubted[n] = self._fails > 0
-            if not valid:
+        edges: list[int] = (np.flatnonzero(known[1:] != known[:-1]) + 1).tolist()
+        for first, last in pairwise([0, *edges, len(known)]):
+            if not known[first]:
+                doubted[first:last] = self._fails > 0
                 self._window = []
                 continue
-            self._window.append(signals[n])
-            if len(self._window) == self._length:
-                self._judge(np.array(self._window))
-                self._window, self._settled = [], True
-                doubted[n] = self._fails > 0
-                if self._passed or self._failed:
-                    return len(block) if self._passed else n
-        return len(block)
+            begin = first
+            while begin < last:
+                end = min(last, begin + self._length - sum(map(len, self._window)))
+                self._window.append(signals[begin:end])
+                doubted[begin:end] = self._fails > 0
+                begin = end
+                if sum(map(len, self._window)) == self._length:
+                    self._judge(np.concatenate(self._window))
+                    self._window, self._settled = [], True
+                    doubted[end - 1] = self._fails > 0
+                    if self._passed or self._failed:
+                        return end - 1
+        return len(signals)
 
     def _signals(self, block: SampleBlock) -> FloatArray | None:
         """Position, acceleration and, where it is compared, the modelled acceleration.

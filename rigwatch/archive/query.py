@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from rigwatch.archive.connection import engine, first_line, opened
-from rigwatch.archive.questions import QUESTIONS
+from rigwatch.archive.questions import COUNTS_BACK, QUESTIONS
 from rigwatch.archive.store import Store
 from rigwatch.wire.errors import ArchiveError, nearest
 
@@ -105,7 +105,8 @@ def ask(
         store: the archive.
         name: the question.
         rig: name of a rig, or a pattern with %.
-        since, until: span of time; by default all, up to the end of the last session.
+        since, until: span of time; by default all. A question that counts back from `until` does
+            so from the end of the last session.
         bounds: what it may take.
 
     Raises:
@@ -114,7 +115,7 @@ def ask(
     if name not in QUESTIONS:
         raise ArchiveError(f"query: no question {name!r}{nearest(name, QUESTIONS)}")
     sql = QUESTIONS[name].sql
-    if until is None and "$until" in sql:
+    if until is None and COUNTS_BACK in sql:
         until = _after_all(store)
     times = {"since": since or _BEGINNING, "until": until or _END}
     pattern = rig.replace("!", "!!").replace("_", "!_")

@@ -16,6 +16,8 @@ class Question:
     sql: str
 
 
+COUNTS_BACK = "$until - interval"
+"""In the SQL of a question about the time before `until`, for which an end far off will not do."""
 _OF_RIG = "rig like $rig escape '!'"
 _IN_SPAN = f"{_OF_RIG} and time >= $since and time < $until"
 _RECORDED = f'{_OF_RIG} and "end" >= $since and start < $until'
@@ -24,9 +26,8 @@ _LEVEL = f"""
     select rig, unit, sum(mean * count) / sum(count) as level, count(*) / 3600 as hours
     from seconds
     where name = 'theta1' and {_OF_RIG}
-      and day between ($until - interval {{first}} day)::date
-      and ($until - interval {{last}} day)::date
-      and second >= $until - interval {{first}} day and second < $until - interval {{last}} day
+      and day between ({COUNTS_BACK} {{first}} day)::date and ({COUNTS_BACK} {{last}} day)::date
+      and second >= {COUNTS_BACK} {{first}} day and second < {COUNTS_BACK} {{last}} day
     group by rig, unit
 """
 

@@ -22,6 +22,9 @@ from rigwatch.wire.typed_files import as_json
 
 WORKER_DIED = "WorkerDied"
 """Kind of failure of a unit whose worker ended each time."""
+AT_ONCE = 1 << 20
+"""Largest file that is read in one piece [bytes]: the buffer for a larger one takes longer to make
+than the recording of some seconds to read."""
 
 
 def content_hash(path: Path) -> str:
@@ -30,13 +33,16 @@ def content_hash(path: Path) -> str:
     Raises:
         OSError: a file cannot be read, or is none: to open a pipe would wait for ever.
     """
-    if path.is_dir():
+    status = path.stat()
+    if stat.S_ISDIR(status.st_mode):
         files = sorted(file for file in path.rglob("*") if file.is_file())
         listed = [(str(file.relative_to(path)), content_hash(file)) for file in files]
         return hashlib.sha256(msgspec.json.encode(listed)).hexdigest()
-    if not stat.S_ISREG(path.stat().st_mode):
+    if not stat.S_ISREG(status.st_mode):
         raise OSError(f"{path}: is no file")
-    with path.open("rb") as file:
+    with path.open("rb", buffering=0) as file:
+        if status.st_size <= AT_ONCE:
+            return hashlib.sha256(file.read()).hexdigest()
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 

@@ -16,8 +16,10 @@ from rigwatch.wire.session import Session
 
 Order = AlarmCommand | ModelChange
 Item = SampleBlock | Order
-JUDGED_SAMPLES = 4096
-"""Longest block that is judged at once: results of longer ones do not fit into a core's cache."""
+JUDGED_SAMPLES = 4088
+"""Longest block that is judged at once: results of longer ones do not fit into a core's cache, and
+with a power of two all results of a sample would share the same few places of it.
+"""
 _MARK = re.compile(r"\((command [0-9a-f]{16})\)$")
 
 

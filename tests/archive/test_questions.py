@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from rigwatch.archive import QUESTIONS, Bounds, Store, ask, index, query
+from rigwatch.archive.questions import COUNTS_BACK
 from rigwatch.commands import main
 from rigwatch.wire.errors import ArchiveError
 from tests.archive.sessions import DAY_S, write_session
@@ -43,6 +44,12 @@ def test_whose_friction_grew(store):
     assert [row["rig"] for row in found] == ["bench2", "bench1"]
     assert found[0]["growth"] == pytest.approx(2.0, abs=1e-3)
     assert found[1]["growth"] == pytest.approx(0.0, abs=1e-2)
+    assert ask(store, "friction-growth").as_dicts() == found  # up to the end of the last session
+
+
+def test_a_question_that_counts_back_from_the_end_is_known_as_one():
+    counting = {name for name, question in QUESTIONS.items() if "interval" in question.sql}
+    assert counting == {name for name, question in QUESTIONS.items() if COUNTS_BACK in question.sql}
 
 
 def test_alarms_of_a_rig_in_a_span(store):

@@ -24,6 +24,17 @@ def test_each_unit_is_there_once_in_order_of_names(tmp_path):
     assert expand(given) == [str(tmp_path / name) for name in names]
 
 
+def test_a_link_is_what_it_leads_to(tmp_path, monkeypatch):
+    (tmp_path / "real").mkdir()
+    (tmp_path / "real/a.mcap").touch()
+    (tmp_path / "b.mcap").symlink_to(tmp_path / "real/a.mcap")
+    (tmp_path / "other").symlink_to(tmp_path / "real")
+    given = [tmp_path / name for name in ("real/a.mcap", "b.mcap", "other/a.mcap", "other")]
+    assert expand(given) == [str(tmp_path / "real/a.mcap")]
+    monkeypatch.chdir(tmp_path / "real")
+    assert expand(["a.mcap", "../real/a.mcap", *given]) == ["a.mcap"]
+
+
 def test_what_is_not_there_is_reported(tmp_path):
     with pytest.raises(BatchError, match="no such file or folder"):
         expand([tmp_path / "none.mcap"])

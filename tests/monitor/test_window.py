@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from monitor.estimation import window as windows
-from monitor.estimation.energies import add, energy, new_energies, recent_energy
+from monitor.estimation.energies import SIGNALS, add, energy, new_energies, recent_energy
 from monitor.estimation.window import new_window, push, sums, windowed_least_squares
 from tests.compiled import from_python
 
@@ -27,7 +27,7 @@ def test_exact_after_a_spike(spike: float) -> None:
     y[n - 3 * window] += spike
     theta = np.empty((n, 2))
     g1, g2 = g[:, 0].copy(), g[:, 1].copy()
-    windowed_least_squares(new_window(window, 2), g1, g2, y, theta)
+    windowed_least_squares(new_window(window), g1, g2, y, theta)
     for end in (n - 1, n - 150, n - window, 5000):
         part = slice(end + 1 - window, end + 1)
         assert np.max(np.abs(theta[end] - fresh(g[part], y[part]))) < 1e-9
@@ -37,7 +37,7 @@ def test_exact_after_a_spike(spike: float) -> None:
 @settings(max_examples=60, deadline=None)
 def test_sums_are_those_of_the_last_samples(length: int, count: int, seed: int) -> None:
     rows = np.random.default_rng(seed).standard_normal((count, 3))
-    window, found = new_window(length, 2), np.empty(6)
+    window, found = new_window(length), np.empty(6)
     for row in rows:
         push(window, row)
     sums(window, found)
@@ -48,8 +48,8 @@ def test_sums_are_those_of_the_last_samples(length: int, count: int, seed: int) 
 @given(length=st.integers(1, 20), count=st.integers(1, 90), recent=st.integers(1, 20))
 @settings(max_examples=60, deadline=None)
 def test_energies_are_those_of_the_last_samples(length: int, count: int, recent: int) -> None:
-    rows = np.random.default_rng(count).standard_normal((count, 2))
-    kept = new_energies(length, 2)
+    rows = np.random.default_rng(count).standard_normal((count, SIGNALS))
+    kept = new_energies(length)
     for row in rows:
         add(kept, row)
     squares = rows[-length:] ** 2

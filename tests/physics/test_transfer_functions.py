@@ -32,6 +32,15 @@ def test_simulation_is_that_of_scipy() -> None:
     assert np.allclose(RIG.simulate(u), lfilter(RIG.b, RIG.a, u), rtol=1e-9, atol=1e-15)
 
 
+@pytest.mark.parametrize("order", range(7))
+def test_filters_of_every_order_are_those_of_scipy(order: int) -> None:
+    random = np.random.default_rng(order)
+    roots = random.uniform(-0.9, 0.9, order)
+    rig = TransferFunction.of(random.standard_normal(order + 1), np.atleast_1d(np.poly(roots)))
+    u = random.standard_normal(200)
+    assert np.allclose(rig.simulate(u), lfilter(rig.b, rig.a, u), rtol=1e-9, atol=1e-12)
+
+
 def test_response_is_that_of_the_impulse() -> None:
     impulse = np.zeros(4096)
     impulse[0] = 1.0

@@ -97,11 +97,31 @@ class Filter:
         return y
 
 
-@part()
+@part(inline="always")
 def filter_sample(b: FloatArray, a: FloatArray, state: FloatArray, u: float) -> float:
-    """One step of the filter; `b` and `a` of one length, `state` one shorter (at least one)."""
-    y = b[0] * u + (state[0] if b.size > 1 else 0.0)
+    """One step of the filter; `b` and `a` of one length, `state` one shorter (at least one).
+
+    The orders 3 and 4, which a rig's filters have, are written out: the compiler makes vectors of a
+    loop over so few, which takes longer than the loop, as does a call.
+    """
     last = b.size - 1
+    if last < 3 or last > 4:
+        return _any_order(b, a, state, u)
+    y = b[0] * u + state[0]
+    state[0] = b[1] * u - a[1] * y + state[1]
+    state[1] = b[2] * u - a[2] * y + state[2]
+    if last == 3:
+        state[2] = b[3] * u - a[3] * y
+    else:
+        state[2] = b[3] * u - a[3] * y + state[3]
+        state[3] = b[4] * u - a[4] * y
+    return y
+
+
+@part()
+def _any_order(b: FloatArray, a: FloatArray, state: FloatArray, u: float) -> float:
+    last = b.size - 1
+    y = b[0] * u + (state[0] if last > 0 else 0.0)
     for i in range(last - 1):
         state[i] = b[i + 1] * u - a[i + 1] * y + state[i + 1]
     if last > 0:
