@@ -151,9 +151,9 @@ def with_base_offered(bench: Bench, found: Verdict) -> Verdict:
 def unchecked(bench: Bench, found: Verdict) -> Verdict:
     """The verdict for a model along its measured motion if there is no healthy recording.
 
-    Model error and a fault are then indistinguishable. An effect is named only if its residual is
-    no larger than the difference between repeated periods of the excitation. If even the best
-    effect leaves many times that, the model does not describe the rig.
+    Model error and a fault are then indistinguishable. An effect is named only if it leaves nothing
+    but noise, and so no model error either. If even the best effect leaves many times that, the
+    model does not describe the rig.
 
     Args:
         bench: the study.
@@ -163,14 +163,13 @@ def unchecked(bench: Bench, found: Verdict) -> Verdict:
         return found
     best = found.best.fitted if found.best is not None else None
     ratio = bench.floor.ratio((best or bench.base).held_out)
-    periods = bench.floor.method == "periods"
     if ratio > MOST and found.word != "model_inadequate":
         text = (
             f"with the best known effect the held-out error is {ratio:.3g} times its noise"
             f" ({METHODS[bench.floor.method]}), expected at most {MOST:g}; {UNCHECKED}"
         )
         return Verdict("model_inadequate", None, (), (), text)
-    certain = periods and best is not None and bench.floor.reached(best.held_out)
+    certain = best is not None and bench.floor.reached(best.held_out)
     if found.word != "missing_effect" or certain:
         return found
     text = f"likely, not certain: {found.text}; {UNCHECKED}"

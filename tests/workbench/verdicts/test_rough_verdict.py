@@ -89,8 +89,9 @@ def test_a_share_above_the_floor_may_be_another_effect(
     [
         pytest.param(11.0, "quiet band", "model_inadequate", id="much is left"),
         pytest.param(2.0, "periods", "undetermined", id="a little is left"),
-        pytest.param(1.0, "quiet band", "undetermined", id="the floor is a guess"),
-        pytest.param(1.0, "periods", "missing_effect", id="nothing but noise is left"),
+        pytest.param(1.3, "quiet band", "undetermined", id="a little more than the least noise"),
+        pytest.param(1.0, "periods", "missing_effect", id="what repeats is explained"),
+        pytest.param(1.0, "quiet band", "missing_effect", id="nothing but noise is left"),
     ],
 )
 def test_without_a_healthy_recording_little_is_claimed(best: float, method: str, word: str) -> None:
