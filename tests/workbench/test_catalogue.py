@@ -12,7 +12,7 @@ from rigwatch.commands.catalogue.effect_table import listed
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import Model, shipped_models
 from rigwatch.wire.typed_files.loading import parse
-from rigwatch.workbench.catalogue import effect_curves, model_report, text_plot
+from rigwatch.workbench.catalogue import effect_curves, inputs_of_run, model_report, text_plot
 
 GUIDE = Path(__file__).parents[2] / "docs" / "models.md"
 SNIPPETS = re.findall(r"```toml\n(.*?)```", GUIDE.read_text("utf-8"), re.DOTALL)
@@ -197,3 +197,11 @@ def test_a_run_is_drawn_in_the_units_shown_and_absolute_factors_are_told(
     assert curve.up == "T [degC]"
     assert curve.y[0] == pytest.approx(20.0)
     assert curve.y[-1] == pytest.approx(end, abs=0.5)
+
+
+def test_the_inputs_of_a_run_are_in_the_units_of_the_file() -> None:
+    text = WARM.replace('inputs.u = { unit = "1" }', 'inputs.u = { unit = "kW" }')
+    model = parse(text.replace("UNIT", "K/kW"), Model, "warm")
+    report = model_report(model, {"u": 3.0})
+    assert inputs_of_run(model, report) == "u = 3 kW"
+    assert report.run[0].y[-1] == pytest.approx(20.0 + 3 * 30.0, abs=1.0)

@@ -8,6 +8,7 @@ from rigwatch.commands.catalogue.curves import plot_lines, save_curves
 from rigwatch.commands.common import check_folder, named_values, print_result
 
 if TYPE_CHECKING:
+    from rigwatch.physics.engine.equations import Model
     from rigwatch.workbench.catalogue import ModelReport
 
 HELP = "check a model's units, names, ports and observability; draw a run"
@@ -21,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", help="a file, or the name of a shipped model")
     parser.add_argument(
         "--input", action="append", default=[], metavar="NAME=VALUE",
-        help="value of an input during the run, in SI; may be repeated",
+        help="value of an input during the run, in the file's unit; may be repeated",
     )  # fmt: skip
     parser.add_argument(
         "--save", type=Path, metavar="FILE", help="draw the run into FILE.svg, one file an output"
@@ -35,8 +36,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     check_folder(arguments.save)
     inputs = named_values("--input", arguments.input, "u=2.5")
-    report = model_report(model_named(arguments.model), inputs, arguments.model)
-    lines = [*_lines(arguments.model, report), *plot_lines(report.run)]
+    model = model_named(arguments.model)
+    report = model_report(model, inputs, arguments.model)
+    lines = [*_lines(arguments.model, report), *_of_run(model, report), *plot_lines(report.run)]
     print_result(arguments, _plain(report), lines)
     if arguments.save:
         save_curves(arguments.save, report.run, lambda curve: f"{arguments.model}: {curve.up}")
@@ -74,6 +76,15 @@ def _lines(name: str, report: "ModelReport") -> list[str]:
     ports = ", ".join(f"{count} at {port}" for port, count in report.entering.items())
     lines += [f"  effects that suit its ports: {ports or 'none, as it has no ports'}"]
     return [*lines, *([f"  {report.trouble}"] if report.trouble else [])]
+
+
+def _of_run(model: "Model", report: "ModelReport") -> list[str]:
+    """What the run that is drawn begins with."""
+    from rigwatch.workbench.catalogue import inputs_of_run
+
+    held = inputs_of_run(model, report)
+    chosen = f", with {held} (others: --input NAME=VALUE)" if held else ""
+    return [f"  a run from the file's starting values{chosen}:"] if report.run else []
 
 
 def _plain(report: "ModelReport") -> dict[str, object]:

@@ -8,7 +8,7 @@ saved.
 from rigwatch.workbench.catalogue.drafts import Draft, draft_of_effects, draft_of_model
 from rigwatch.workbench.catalogue.drawings import plotted, text_plot
 from rigwatch.workbench.catalogue.effect_curves import Curve, effect_curves
-from rigwatch.workbench.catalogue.model_report import ModelReport, model_report
+from rigwatch.workbench.catalogue.model_report import ModelReport, inputs_of_run, model_report
 from rigwatch.workbench.catalogue.port_report import variables_known
 from rigwatch.workbench.catalogue.problems import Problem
 
@@ -20,6 +20,7 @@ __all__ = [
     "draft_of_effects",
     "draft_of_model",
     "effect_curves",
+    "inputs_of_run",
     "model_report",
     "plotted",
     "text_plot",

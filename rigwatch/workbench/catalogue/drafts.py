@@ -7,7 +7,7 @@ from pathlib import Path
 from rigwatch.physics.engine.equations import Effect, Model, parse_effects, parse_model
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.workbench.catalogue.effect_curves import Curve, effect_curves
-from rigwatch.workbench.catalogue.model_report import ModelReport, model_report
+from rigwatch.workbench.catalogue.model_report import ModelReport, inputs_of_run, model_report
 from rigwatch.workbench.catalogue.problems import Problem, problem, remark
 from rigwatch.workbench.steps import check_effect
 
@@ -109,5 +109,6 @@ def _table(model: Model, name: str) -> str:
 
 def _summary(model: Model, report: ModelReport) -> str:
     parts = f"{len(model.states)} states, {len(model.parameters)} parameters"
-    run = f"; run after a step of {report.step:g} of the inputs" if report.run else ""
+    held = inputs_of_run(model, report)
+    run = f"; run with {held}" if held else ""
     return f"{model.name}: equations and units are consistent; {parts}{run}"

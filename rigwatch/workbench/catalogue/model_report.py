@@ -30,7 +30,8 @@ from rigwatch.workbench.catalogue.effect_curves import Curve
 from rigwatch.workbench.catalogue.port_report import entering, unread
 
 STEPS = (1.0, 0.1, 0.01, 0.0)
-"""Step sizes of the inputs; the first with which the run stays finite is used."""
+"""Sizes of the inputs that are not given, in their units as the file shows them; the first with
+which the run stays finite is used."""
 MOST, FINEST, SETTLED = 4000, 20.0, 5.0
 """Most samples of a run, samples per fastest time constant, slowest time constants per run."""
 SHOWN = 1e-9
@@ -52,7 +53,7 @@ class ModelReport:
         unbounded: fixed parameters without `low` and `high`, so that any value is taken.
         entering: number of effects of the library that suit each port, by its name.
         unread: variables of ports that no effect of the library uses, as "port.variable".
-        step: step size of the inputs that are not given.
+        inputs: value of each input during the run, in the unit in which it is shown.
         run: the outputs from the file's initial state with these inputs; none without states.
         trouble: why the run failed.
     """
@@ -65,7 +66,7 @@ class ModelReport:
     unbounded: tuple[str, ...]
     entering: Mapping[str, int]
     unread: tuple[str, ...]
-    step: float
+    inputs: Mapping[str, float]
     run: tuple[Curve, ...]
     trouble: str = ""
 
@@ -80,7 +81,7 @@ def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> 
 
     Args:
         model: the model.
-        inputs: values of some inputs during the run, by name.
+        inputs: values of some inputs during the run, by name, in the units in which they are shown.
         where: its file, for errors.
 
     Raises:
@@ -101,14 +102,14 @@ def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> 
         unbounded=_unbounded(model),
         entering=entering(model),
         unread=unread(model),
-        step=0.0,
+        inputs={},
         run=(),
     )
     if not model.states:
         return told
     for step in STEPS:
         given = dict.fromkeys(model.inputs, step) | dict(inputs)
-        time, outputs, slopes = _run(system, given)
+        time, outputs, slopes = _run(system, {n: _in_si(model, n, at) for n, at in given.items()})
         if np.isfinite(outputs).all() and np.isfinite(slopes).all():
             break
     else:
@@ -121,7 +122,19 @@ def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> 
         for column, (name, own) in enumerate(model.outputs.items())
     )
     unseen, tied = _observed(list(model.states), slopes)
-    return replace(told, unseen=unseen, tied=tied, step=step, run=curves)
+    return replace(told, unseen=unseen, tied=tied, inputs=given, run=curves)
+
+
+def inputs_of_run(model: Model, report: ModelReport) -> str:
+    """The inputs of the run in words, such as "power = 1 kW"; empty without inputs or a run."""
+    units = {name: own.shown or own.unit for name, own in model.inputs.items()}
+    return ", ".join(f"{name} = {value:g} {units[name]}" for name, value in report.inputs.items())
+
+
+def _in_si(model: Model, name: str, value: float) -> float:
+    """The value of an input in SI, from the unit in which it is shown."""
+    own = model.inputs[name]
+    return unit_of(own.shown or own.unit).to_si(value)
 
 
 def _shown(output: Output, values: FloatArray) -> FloatArray:
