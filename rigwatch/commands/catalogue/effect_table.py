@@ -13,6 +13,10 @@ KINDS = {
 """Kinds of ports with the headings of their effects."""
 
 
+RARER = " °"
+"""Marks effects that are tried only where a study asks for the whole library."""
+
+
 def listed() -> dict[str, dict[str, Effect]]:
     """The library's effects by kind of port."""
     found = library()
@@ -35,6 +39,8 @@ def described(name: str, effect: Effect) -> list[str]:
     lines.append(f"  source     {effect.source}")
     if effect.confused_with:
         lines.append(f"  looks like {', '.join(effect.confused_with)}")
+    if effect.elective:
+        lines.append("  rarer      tried with whole_library = true in the study")
     if effect.refines:
         lines.append(f"  refines    {effect.refines}, which is tried first")
     return lines
@@ -51,7 +57,8 @@ def markdown(effects: Mapping[str, Mapping[str, Effect]]) -> str:
     parts = []
     for kind, found in effects.items():
         rows = [
-            f"| `{name}` | `{_shown(e.expression)}` | {e.physics} | {_like(e)} | {e.source} |"
+            f"| `{name}`{RARER * e.elective} | `{_shown(e.expression)}` | {e.physics} | {_like(e)}"
+            f" | {e.source} |"
             for name, e in sorted(found.items())
         ]
         head = ["| effect | expression | physics | looks like | source |", "| --- " * 5 + "|"]

@@ -50,12 +50,16 @@ def _describe(arguments: argparse.Namespace) -> int:
 
 
 def _list(arguments: argparse.Namespace) -> int:
-    from rigwatch.commands.catalogue.effect_table import KINDS, listed
+    from rigwatch.commands.catalogue.effect_table import KINDS, RARER, listed
 
     found = listed()
     lines: list[str] = []
     for kind, effects in found.items():
         lines += [f"{KINDS[kind]}:"]
-        lines += (f"  {name:24} {effect.physics}" for name, effect in sorted(effects.items()))
+        lines += (
+            f"  {name + RARER * effect.elective:26} {effect.physics}"
+            for name, effect in sorted(effects.items())
+        )
+    lines.append(f"{RARER.strip()} rarer: tried with whole_library = true in the study")
     print_result(arguments, found, lines)
     return 0
