@@ -27,14 +27,11 @@ from rigwatch.physics.engine.fit.recording import (
 )
 from rigwatch.physics.engine.fit.ties import untied
 from rigwatch.physics.engine.fit.windowed_fit import (
-    CLOSE,
-    FAR,
     QUIET,
     Fit,
     Prior,
     bounds,
     covariance_of,
-    deviations,
     error_at,
     evaluate,
     fit,
@@ -42,9 +39,7 @@ from rigwatch.physics.engine.fit.windowed_fit import (
 )
 
 __all__ = [
-    "CLOSE",
     "ENOUGH",
-    "FAR",
     "QUIET",
     "EffectStates",
     "Fit",
@@ -58,7 +53,6 @@ __all__ = [
     "beginning",
     "bounds",
     "covariance_of",
-    "deviations",
     "error_at",
     "evaluate",
     "filled",
