@@ -122,6 +122,19 @@ def test_41_a_monitor_that_hangs(rig: SupervisedRig) -> None:
     rig.each_is_judged_once(first)
 
 
+def _is_taken(taken: socket.socket, port: int) -> bool:
+    """Whether the port could be taken; not while the router that was killed still has it.
+
+    From then on no router that is started can listen there.
+    """
+    try:
+        taken.bind(("127.0.0.1", port))
+    except OSError:
+        return False
+    taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 0)
+    return True
+
+
 def test_52_a_router_that_stays_away_for_long(rig: SupervisedRig) -> None:
     rig.goes_on()
     first, began = rig.device.device.next_seq, time.time()
@@ -130,10 +143,8 @@ def test_52_a_router_that_stays_away_for_long(rig: SupervisedRig) -> None:
     with socket.socket() as taken:
         taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         os.kill(rig.pid("router"), signal.SIGKILL)
+        eventually(lambda: _is_taken(taken, port), "the router's port, before its next start")
         rig.comes("ended", "router", began)
-        taken.bind(("127.0.0.1", port))
-        # From now on a router that is started cannot listen.
-        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 0)
         time.sleep(Limits().stall + 2.0)
         assert not rig.bus.connected()
         freed = time.time()

@@ -61,11 +61,10 @@ def cannot_tell(bench: Bench, rows: Sequence[Ranked], verdict: Verdict) -> Verdi
     A fit that leaves all of them open follows what is missing, and so hides it: in windows of a
     minute a block that warms for ten minutes is any ramp. That no effect helps there says nothing.
     """
-    ended, free = bench.base.convergence, bench.base.compiled.system.free
-    open_ = set(ended.undetermined) if ended else set()
     accepted = any(row.accepted for row in rows)
-    if verdict.word != "unknown_effect" or accepted or not free or set(free) - open_:
+    if verdict.word != "unknown_effect" or accepted or not bench.base.determines_nothing:
         return verdict
+    free = bench.base.compiled.system.free
     text = (
         f"the training determines none of {', '.join(free)}, so that what is missing cannot be"
         " told; record longer, or more changes of the inputs, or give what is known with --set"

@@ -1,9 +1,8 @@
 """Effects that a recording cannot tell from the best: its class, and rivals of other physics.
 
 The class are effects of the same physics, or with the same residual to first order, whose error is
-the same; if one is a sensor's and the other is not, they are rivals. Rivals are also effects of
-other physics whose directions are similar and whose errors do not differ beyond chance, or beyond
-what other missing physics or the model's own error may favour.
+the same. Rivals are effects of other physics whose directions are similar and whose errors do not
+differ beyond chance, or beyond what other missing physics or the model's own error may favour.
 """
 
 from collections.abc import Sequence
@@ -22,7 +21,7 @@ An effect may be named for its parameters and be behind.
 NO_DIFFERENCE = 1e-4
 """Relative difference of errors that reflects only where two fits stopped."""
 A_TRACE = 0.01
-"""Relative difference of errors that does not tell a sensor's effect from the machine's."""
+"""Relative difference of errors that tells no two effects of a class apart."""
 PERHAPS = 1.0
 """Standard deviations by which an effect with more parameters must be ahead to be a rival."""
 NEARLY = 0.8
@@ -50,7 +49,7 @@ def undistinguished(
         cosine = best.cosines.get(row.label, 0.0)
         kin = cosine > SAME or same_family(best, row)
         if _same_shift(best, row) or (kin and _in_class(best, row, cosine, trusted=trusted)):
-            (rivals if _at_the_other_end(best, row, cosine) else members).append(row.label)
+            members.append(row.label)
         elif not kin and _rivals(best, row, cosine, trusted=trusted):
             rivals.append(row.label)
     rivals += _parallel_to_rivals(rows, rivals, {*members, *rivals})
@@ -83,16 +82,6 @@ def _in_class(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> boo
         return _is_simple_enough(best, row) or (cosine > SAME and row.port != best.port)
     near = row.held_out_error < MUCH_WORSE * best.held_out_error
     return not trusted and row.accepted and cosine > ALIKE and near and _is_simple_enough(best, row)
-
-
-def _at_the_other_end(best: Ranked, row: Ranked, cosine: float) -> bool:
-    """Whether one is a sensor's and the other is not, with the same result.
-
-    However alike they are to this recording: who mends a late sensor does not look at a late drive.
-    """
-    if (best.kind == "sensor") == (row.kind == "sensor"):
-        return False
-    return cosine > SAME if row.fitted is None else _as_small(best, row)
 
 
 def as_good(best: Ranked, rows: Sequence[Ranked], members: Sequence[str]) -> list[str]:

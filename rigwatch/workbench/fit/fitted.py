@@ -45,6 +45,16 @@ class Fitted:
         return self.train.compiled
 
     @property
+    def determines_nothing(self) -> bool:
+        """Whether the training leaves every parameter open, and so follows what is missing."""
+        free = self.compiled.system.free
+        return (
+            bool(free)
+            and self.convergence is not None
+            and (set(free) <= set(self.convergence.undetermined))
+        )
+
+    @property
     def train_error(self) -> float:
         """Overall error on the training recordings."""
         return overall_error(self.train)

@@ -63,7 +63,7 @@ def rank(
     possible = [row for row in rows if not row.failure]
     # Along the motion windows are whole recordings; what a rough model leaves is its own error.
     free_run = not (data.along_motion or study.model.rough)
-    far = free_run and floor.ratio(base.held_out) > NEAR
+    far = free_run and floor.ratio(base.held_out) > NEAR and not base.determines_nothing
     chosen = select_for_fit(possible, kind, at_floor=floor.reached(base.held_out), far=far)
     enough = fit_each(study, data, base, floor, chosen, progress)
     if not enough:

@@ -723,28 +723,26 @@ def test_beside_an_input_that_hardly_moves_a_late_input_is_a_late_output(
     assert sensor.fitted is not None
     sensor.fitted.compiled.system.model.driving = lambda: ("power", "room")
     found = judge(base(), [sensor, drive], PERIODS)
-    assert found.word == ("missing_effect" if told_apart else "undetermined")
-    assert ("delay@drive" in found.rivals) is not told_apart
+    assert found.word == "missing_effect"
+    assert ("delay@drive" in found.members) is not told_apart
 
 
 @pytest.mark.parametrize(
-    ("kind", "error", "word"),
+    ("error", "told"),
     [
-        pytest.param("actuator", 1.0, "missing_effect", id="both of the machine"),
-        pytest.param("sensor", 1.0, "undetermined", id="one of a sensor"),
-        pytest.param("sensor", None, "undetermined", id="one of a sensor, not fitted"),
-        pytest.param("sensor", 1.02, "missing_effect", id="one of a sensor, told apart"),
+        pytest.param(1.0, True, id="equal"),
+        pytest.param(None, True, id="parallel, not fitted"),
+        pytest.param(1.02, False, id="told apart"),
     ],
 )
-def test_what_looks_the_same_in_machine_and_sensor_is_undetermined(
-    kind: str, error: float | None, word: str
+def test_what_a_recording_cannot_tell_from_the_effect_named_stands_in_the_sentence(
+    error: float | None, *, told: bool
 ) -> None:
-    other = row("offset@x", error or 1.0, kind=kind, fitted=error is not None)
+    other = row("offset@x", error or 1.0, kind="sensor", fitted=error is not None)
     found = judge(base(), [same("offset@x", label_of="constant_force@load"), other], PERIODS)
-    assert found.word == word
-    assert ("offset@x" in found.rivals) is (word == "undetermined")
+    assert found.word == "missing_effect"
     both = "constant_force@load (or offset@x: this recording cannot tell them apart) is missing"
-    assert (both in found.text) is (kind == "actuator")
+    assert (both in found.text) is told
 
 
 def test_where_training_and_held_out_disagree_nothing_is_named_alone() -> None:
