@@ -16,11 +16,9 @@ from rigwatch.wire.messages import (
     GAPS,
     HEALTH,
     RUN,
+    SAID_BY_ANYBODY,
     SAMPLES,
     Alarm,
-    Event,
-    Gap,
-    Health,
     Message,
 )
 
@@ -86,6 +84,6 @@ def _at_the_latest(message: Message, now_ns: int) -> Message:
 
     The screen follows the newest time that is drawn: a message dated ahead would leave it empty.
     """
-    if isinstance(message, Event | Gap | Health) and message.t_ns > now_ns:
+    if isinstance(message, SAID_BY_ANYBODY) and message.t_ns > now_ns:
         return replace(message, t_ns=now_ns)
     return message

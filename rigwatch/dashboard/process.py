@@ -16,7 +16,7 @@ from rigwatch.dashboard.drawer import Drawer
 from rigwatch.dashboard.feed import Feed
 from rigwatch.dashboard.viewer import Choice, ForeignViewer, Viewer, ViewerError, open_viewer
 from rigwatch.wire.bus import Bus
-from rigwatch.wire.host import NO_ROUTER, Heartbeat
+from rigwatch.wire.host import Heartbeat, waits_for_samples
 from rigwatch.wire.messages import HEALTH, Health
 from rigwatch.wire.rig_config import DashboardSection
 
@@ -111,7 +111,7 @@ class LiveDashboard:
         return ""
 
     def _tell_supervisor(self) -> None:
-        waits = "no samples arrive" if self._bus.connected() else NO_ROUTER
+        waits = waits_for_samples(connected=self._bus.connected())
         self._heartbeat.advance(self.facts.samples, waits)
 
     def _tell_rig(self) -> None:

@@ -25,13 +25,13 @@ from rigwatch.recorder.thinning import Thinning
 from rigwatch.wire.bus import Bus, joined
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.host import (
-    NO_ROUTER,
     Heartbeat,
     Kept,
     Pulse,
     free_share,
     keep_memory_tidy,
     use_few_pools,
+    waits_for_samples,
 )
 from rigwatch.wire.messages import (
     ALARMS,
@@ -185,7 +185,7 @@ def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event, pul
             while not stop.wait(recorder.settings.flush * _OF_FLUSH):
                 kept.check()
                 recorder.turn(time.monotonic(), time.time_ns())
-                waits = "no samples arrive" if bus.connected() else NO_ROUTER
+                waits = waits_for_samples(connected=bus.connected())
                 pulse.advance(recorder.feed.samples, waits)
             pulse.stopping()
         finally:

@@ -4,7 +4,7 @@ from rigwatch.wire.host.both_clocks import both_clocks
 from rigwatch.wire.host.disk_space import free_share
 from rigwatch.wire.host.ending import set_at_hangup, set_at_signal
 from rigwatch.wire.host.few_pools import keep_memory_tidy, settle_memory, use_few_pools
-from rigwatch.wire.host.heartbeat import NO_ROUTER, WAITS, Heartbeat, waits_of
+from rigwatch.wire.host.heartbeat import NO_ROUTER, WAITS, Heartbeat, waits_for_samples, waits_of
 from rigwatch.wire.host.one_keeper import Hold, Kept
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
 from rigwatch.wire.host.processes import end_process, end_with_parent, last_line
@@ -51,6 +51,7 @@ __all__ = [
     "set_at_signal",
     "settle_memory",
     "use_few_pools",
+    "waits_for_samples",
     "waits_of",
     "write_through",
 ]

@@ -30,6 +30,11 @@ WAITS_AFTER = 5.0
 """Time without samples after which a process says that it waits [s]."""
 
 
+def waits_for_samples(*, connected: bool) -> str:
+    """What a process waits for that gets no samples over the bus."""
+    return "no samples arrive" if connected else NO_ROUTER
+
+
 def waits_of(rigs: Iterable[str]) -> str:
     """What a process waits for whose rigs wait for these; empty if one of them does not wait."""
     found = list(rigs)

@@ -342,6 +342,8 @@ Message = (
     | RunInfo
     | ModelChange
 )
+SAID_BY_ANYBODY = (AlarmCommand, Event, Gap, Health)
+"""Messages that every client of a bus may send, with times of its own."""
 MESSAGE_TYPES: tuple[type[Message], ...] = (
     SampleBlock,
     EstimateBlock,

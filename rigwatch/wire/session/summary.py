@@ -9,13 +9,11 @@ from numpy.typing import NDArray
 
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import (
+    SAID_BY_ANYBODY,
     Alarm,
-    AlarmCommand,
     Column,
     EstimateBlock,
-    Event,
     Gap,
-    Health,
     Message,
     RunInfo,
     SampleBlock,
@@ -100,12 +98,6 @@ class Summary:
         return (self.end_ns - self.start_ns) / 1e9
 
 
-_SAID_BY_ANYBODY = (AlarmCommand, Event, Gap, Health)
-"""Messages that every client of a bus may send: with the time of one dated fifty years ahead, a
-session would never be old enough to be removed.
-"""
-
-
 def summarise(session: Session, also: Callable[[Message], None] | None = None) -> Summary:
     """Summarise the whole session.
 
@@ -134,7 +126,8 @@ def summarise(session: Session, also: Callable[[Message], None] | None = None) -
         elif isinstance(message, Gap):
             losses.add(message)
         if not isinstance(message, RunInfo):  # it may be years older
-            (others if isinstance(message, _SAID_BY_ANYBODY) else times).add(message)
+            # By what a stranger dates fifty years ahead a session would never be old.
+            (others if isinstance(message, SAID_BY_ANYBODY) else times).add(message)
     summary.start_ns, summary.end_ns = (times if times.any else others).span
     summary.topics = dict(sorted(counts.items()))
     summary.devices = [

@@ -42,7 +42,7 @@ def undistinguished(
             may favour one of two similar effects, so that neither rules out the other, and it
             may lower the error of an effect with more parameters for no physical reason.
     """
-    members, rivals = [best.label], list[str]()
+    members, rivals = [best.label], []
     for row in rows:
         if row is best:
             continue

@@ -47,12 +47,8 @@ class Fitted:
     @property
     def determines_nothing(self) -> bool:
         """Whether the training leaves every parameter open, and so follows what is missing."""
-        free = self.compiled.system.free
-        return (
-            bool(free)
-            and self.convergence is not None
-            and (set(free) <= set(self.convergence.undetermined))
-        )
+        free, ended = set(self.compiled.system.free), self.convergence
+        return bool(free) and ended is not None and free <= set(ended.undetermined)
 
     @property
     def train_error(self) -> float:
