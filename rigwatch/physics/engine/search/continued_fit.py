@@ -185,7 +185,7 @@ class _ContinuedWindows:
         steps = unit * ((begin == 0) | (told > NEGLIGIBLE * np.linalg.norm(residual)))
 
         def unknowns(moved: FloatArray) -> FloatArray:
-            return np.clip(begin + steps * (moved - FAR), low, high)
+            return np.asarray(np.clip(begin + steps * (moved - FAR), low, high))
 
         def residuals(moved: FloatArray) -> FloatArray:
             q = unknowns(moved)
@@ -200,7 +200,7 @@ class _ContinuedWindows:
                 weak = np.zeros((len(prior.slopes), len(steps)))
                 weak[:, : self._m] = prior.slopes
                 own = np.vstack([own, weak])
-            return own * steps
+            return np.asarray(own * steps)
 
         try:
             found = scipy.optimize.least_squares(
