@@ -82,6 +82,29 @@ def fit_continued(
 
 
 @QUIET
+def begun_anew_nearby(found: Fit, recording: Recording, horizon: int, substeps: int) -> Fit:
+    """A continued fit whose `begun_anew` is the optimum nearest to its own parameters.
+
+    The one that it came from may lie in another valley, where an effect that the recording needs
+    has the wrong sign.
+
+    Args:
+        found: fitted by `fit_continued`.
+        recording, horizon, substeps: what it was fitted to.
+    """
+    if not found.continued:
+        return found
+    try:
+        near = fit(
+            found.compiled, recording, horizon, start=found.parameters, scale=found.scale,
+            initial=found.initial, substeps=substeps,
+        )  # fmt: skip
+    except ModelError:
+        return found
+    return replace(found, begun_anew=near)
+
+
+@QUIET
 def continued_error_at(
     found: Fit, recording: Recording, horizon: int, substeps: int, parameters: FloatArray
 ) -> float:
