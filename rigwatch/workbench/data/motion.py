@@ -2,8 +2,9 @@
 
 With unknown initial pressures, fluxes or temperatures free runs drift. Driven by the measured
 motion these states converge within a fraction of a second, and a whole recording is one run without
-windows. This form is used if channels measure some but not all of a model's states and at least one
-output remains to be predicted; a study can request either form (`prediction`).
+windows. This form is used if channels measure some but not all of a model's states, at least one
+output remains to be predicted, and no parameter is lost on which a free run depends; a study can
+request either form (`prediction`).
 """
 
 from collections.abc import Mapping
@@ -19,6 +20,7 @@ from rigwatch.physics.engine.equations import (
     has_hidden_states,
     measured_states,
     predicted_outputs,
+    unjudged_along_motion,
     unmoved_at_rest,
 )
 from rigwatch.physics.engine.fit import (
@@ -63,7 +65,9 @@ def predicts_along_motion(study: Study) -> bool:
     if study.file.prediction != "auto":
         return study.file.prediction == "measured motion"
     model = study.model
-    return not model.rough and has_hidden_states(model) and bool(predicted_outputs(model))
+    if model.rough or not (has_hidden_states(model) and predicted_outputs(model)):
+        return False
+    return not unjudged_along_motion(model)
 
 
 def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
