@@ -256,7 +256,7 @@ class SampleOrder(Generic[S]):
 
     def _settle(self, ask: Ask, reply: RingReply[S]) -> None:
         front = self._line[0]
-        if reply.settled == UNKNOWN and self._still_sends(front):
+        if reply.settled <= UNKNOWN and self._still_sends(front):
             # Another source's ring: after an interruption it may be reachable first.
             self._no_reply(ask)
             return
@@ -266,13 +266,13 @@ class SampleOrder(Generic[S]):
             if front.ended:
                 self._learn_of(reply.blocks)
             return
-        if reply.settled < ask.first - 1 and not front.ended:
+        if UNKNOWN < reply.settled < ask.first - 1 and not front.ended:
             self._set_back(front, reply.settled + 1)
             return
         if reply.settled < ask.first and ask.last != OPEN:
             self._drop_forged(front)
             return
-        for block in reply.blocks:
+        for block in (one for one in reply.blocks if one.boot == front.boot):
             before = self.counters.delivered
             self._skip(front, min(block.seq, ask.last + 1) - 1, "the ring no longer has them")
             self._take_recovered(front, block, ask.last)
@@ -280,6 +280,7 @@ class SampleOrder(Generic[S]):
         self._skip(front, min(reply.settled, ask.last), "the ring no longer has them")
         if ask.last == OPEN and front.ended and not self._progressed(ask, front):
             self._leave(front)
+            self._learn_of(reply.blocks)
 
     def _learn_of(self, blocks: tuple[S, ...]) -> None:
         """Put a boot that began and ended unseen before the one that has control now."""
