@@ -16,9 +16,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from rigwatch.physics.engine.equations import (
     Model,
     along_measured_motion,
-    has_hidden_states,
     measured_states,
-    predicted_outputs,
     unmoved_at_rest,
 )
 from rigwatch.physics.engine.fit import (
@@ -56,14 +54,6 @@ LATE = (
     " motion is shifted by that"
 )
 FORM = "predicted along the measured motion: {shown} drive the model, {hidden} are simulated"
-
-
-def predicts_along_motion(study: Study) -> bool:
-    """Whether a study is predicted along its measured motion."""
-    if study.file.prediction != "auto":
-        return study.file.prediction == "measured motion"
-    model = study.model
-    return not model.rough and has_hidden_states(model) and bool(predicted_outputs(model))
 
 
 def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
