@@ -7,7 +7,8 @@ import numpy as np
 
 from rigwatch.wire.exchange import ImportMapping, import_file
 from rigwatch.workbench.study import Study, open_study
-from sim_plant.machines import MACHINES, log, strength_for
+from sim_plant.machines import MACHINES, Machine, log, strength_for
+from sim_plant.machines.loggers import logged
 
 UNITS = {"N": "N", "m": "m", "m_s2": "m/s^2", "V": "V", "rad_s": "rad/s", "rad": "rad", "s": "s"}
 """Units by the endings of column names."""
@@ -25,8 +26,13 @@ WITH_HEALTHY = ("oscillator",)
 """Machines with a healthy recording."""
 
 
-def machine_study(
-    folder: Path, machine: str, shares: Mapping[str, float], noise: float, seed: int
+def machine_study(  # noqa: PLR0917 -- what makes a case
+    folder: Path,
+    machine: str,
+    shares: Mapping[str, float],
+    noise: float,
+    seed: int,
+    logger: str = "",
 ) -> Study:
     """The study of a machine with hidden effects.
 
@@ -36,6 +42,7 @@ def machine_study(
         shares: share of the outputs' rms that each hidden effect changes alone.
         noise: of the sensors, relative to the rms of their signals.
         seed: of the recordings.
+        logger: one of `LOGGERS`; empty for logs without a fault.
     """
     plant, text = MACHINES[machine], STUDIES[machine]
     hidden = {name: strength_for(plant, name, share, seed) for name, share in shares.items()}
@@ -43,12 +50,22 @@ def machine_study(
     if machine in WITH_HEALTHY:
         recordings.append(("healthy", {}, seed + 2000))
     for use, effects, own_seed in recordings:
-        _write(folder / f"{use}.csv", log(plant, effects, noise, own_seed))
-        mapping = ImportMapping(channels=_channels(plant.columns), time="time_s[s]")
+        given = (plant, effects, noise, own_seed)
+        _write(folder / f"{use}.csv", logged(*given, logger) if logger else log(*given))
+        mapping = ImportMapping(
+            channels=_channels(plant.columns), time="time_s[s]", held=_held(plant) if logger else ()
+        )
         import_file(folder / f"{use}.csv", folder / f"{use}.mcap", mapping)
         text += f'\n[[{use}]]\nsession = "{use}.mcap"\n'
     (folder / "study.toml").write_text(text, encoding="utf-8")
     return open_study(folder)
+
+
+def _held(plant: Machine) -> tuple[str, ...]:
+    """Channels of commands, which are held from sample to sample."""
+    if not plant.any_clock:
+        return ()
+    return tuple(column.partition("_")[0] for column in plant.columns[: plant.commanded])
 
 
 def _channels(columns: tuple[str, ...]) -> dict[str, str]:

@@ -46,18 +46,19 @@ def _emptied(w: float, flow: float, tank: int, h: float) -> float:
 
 
 @kernel()
-def run(voltage: FloatArray, s: FloatArray, out: FloatArray) -> None:
+def run(voltage: FloatArray, s: FloatArray, out: FloatArray, spans: FloatArray) -> None:
     """Level of the lower tank [m] at each sample; the first sample is at rest.
 
     Args:
         voltage: of the pump, held from sample to sample, shape (n,) [V].
         s: strengths of `EFFECTS`.
         out: level, shape (n, 1).
+        spans: time from each sample to the next, shape (n,) [s].
     """
-    h = 1.0 / (RATE * STEPS)
     w1, w2, shown, flow = 0.0, 0.0, 0.0, 0.0
     resting = round(1500 * RATE)
     for k in range(-resting, len(voltage)):
+        h = (spans[k] if k >= 0 else 1.0 / RATE) / STEPS
         level = w2 * w2 / (2.0 * FALL)
         if k >= 0:
             out[k, 0] = shown if s[4] > 0 else level

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import ModuleType
 
 import numpy as np
 
@@ -31,7 +32,9 @@ class Machine:
         precise: number of following columns that come from more accurate sensors.
         effects: names of the effects that can be hidden.
         drive: a random excitation, from a seed.
-        run: noise-free columns for an excitation and strengths of effects.
+        run: noise-free columns for an excitation and strengths of effects; that of a machine whose
+            log may have any clock takes the times from sample to sample too.
+        any_clock: whether it does.
     """
 
     rate: float
@@ -40,7 +43,8 @@ class Machine:
     precise: int
     effects: tuple[str, ...]
     drive: Callable[[int], FloatArray]
-    run: Callable[[FloatArray, Mapping[str, float]], FloatArray]
+    run: Callable[..., FloatArray]
+    any_clock: bool = False
 
 
 def strength_for(machine: Machine, effect: str, share: float, seed: int) -> float:
@@ -59,7 +63,11 @@ def strength_for(machine: Machine, effect: str, share: float, seed: int) -> floa
 
 
 def log(
-    machine: Machine, hidden: Mapping[str, float], noise: float, seed: int
+    machine: Machine,
+    hidden: Mapping[str, float],
+    noise: float,
+    seed: int,
+    spans: FloatArray | None = None,
 ) -> dict[str, FloatArray]:
     """A recording as a logger writes it: time and columns, each of shape (n,).
 
@@ -68,10 +76,14 @@ def log(
         hidden: strengths of the hidden effects, by name.
         noise: standard deviation of the sensors' noise, relative to the rms of their signals.
         seed: of excitation and noise.
+        spans: time from each sample to the next, for a machine with `any_clock`, shape (n,) [s];
+            of the machine's rate where None.
     """
-    clean = machine.run(machine.drive(seed), hidden)
-    random = np.random.default_rng([seed, 1])
+    drive, random = machine.drive(seed), np.random.default_rng([seed, 1])
+    clean = machine.run(drive, hidden) if spans is None else machine.run(drive, hidden, spans)
     table = {"time_s": np.arange(len(clean)) / machine.rate}
+    if spans is not None:
+        table["time_s"] = np.concatenate([[0.0], np.cumsum(spans[:-1])])
     for index, name in enumerate(machine.columns):
         level = noise * (BETTER if index < machine.commanded + machine.precise else 1.0)
         signal = clean[:, index]
@@ -91,14 +103,15 @@ def _strengths(effects: tuple[str, ...], hidden: Mapping[str, float]) -> FloatAr
     return np.array([hidden.get(name, 0.0) for name in effects])
 
 
-def _driven(
-    kernel: Callable[..., None], effects: tuple[str, ...], outputs: int
-) -> Callable[..., FloatArray]:
+def _driven(plant: ModuleType, outputs: int) -> Callable[..., FloatArray]:
     """A plant whose log is its command and its outputs."""
 
-    def run(command: FloatArray, hidden: Mapping[str, float]) -> FloatArray:
+    def run(
+        command: FloatArray, hidden: Mapping[str, float], spans: FloatArray | None = None
+    ) -> FloatArray:
         out = np.empty((len(command), outputs))
-        kernel(command, _strengths(effects, hidden), out)
+        even = np.full(len(command), 1.0 / plant.RATE)
+        plant.run(command, _strengths(plant.EFFECTS, hidden), out, even if spans is None else spans)
         return np.column_stack([command, out])
 
     return run
@@ -131,22 +144,22 @@ MACHINES: dict[str, Machine] = {
     ),
     "motor": Machine(
         motor.RATE, ("voltage_V", "speed_rad_s"), 1, 0,
-        motor.EFFECTS, motor.drive, _driven(motor.run, motor.EFFECTS, 1),
+        motor.EFFECTS, motor.drive, _driven(motor, 1), any_clock=True,
     ),
     "pendulum": Machine(
         pendulum.RATE, ("voltage_V", "angle_rad"), 1, 0,
-        pendulum.EFFECTS, pendulum.drive, _driven(pendulum.run, pendulum.EFFECTS, 1),
+        pendulum.EFFECTS, pendulum.drive, _driven(pendulum, 1), any_clock=True,
     ),
     "damper": Machine(
         damper.RATE, ("displacement_m", "force_N"), 0, 1, damper.EFFECTS, damper.drive, _damper
     ),
     "tanks": Machine(
         tanks.RATE, ("voltage_V", "level1_m", "level2_m"), 1, 0,
-        tanks.EFFECTS, tanks.drive, _driven(tanks.run, tanks.EFFECTS, 2),
+        tanks.EFFECTS, tanks.drive, _driven(tanks, 2), any_clock=True,
     ),
     "cascade": Machine(
         cascade.RATE, ("voltage_V", "level_m"), 1, 0,
-        cascade.EFFECTS, cascade.drive, _driven(cascade.run, cascade.EFFECTS, 1),
+        cascade.EFFECTS, cascade.drive, _driven(cascade, 1), any_clock=True,
     ),
 }  # fmt: skip
 """The machines by name."""

@@ -31,18 +31,19 @@ EFFECTS = (
 
 
 @kernel()
-def run(voltage: FloatArray, s: FloatArray, out: FloatArray) -> None:
+def run(voltage: FloatArray, s: FloatArray, out: FloatArray, spans: FloatArray) -> None:
     """Speed [rad/s] at each sample.
 
     Args:
         voltage: commanded, held from sample to sample, shape (n,) [V].
         s: strengths of `EFFECTS`.
         out: speed, shape (n, 1).
+        spans: time from each sample to the next, shape (n,) [s].
     """
-    h = 1.0 / (RATE * STEPS)
-    fade = np.exp(-h * RESISTANCE / INDUCTANCE)
     i, w, a, shown = 0.0, 0.0, 0.0, 0.0
     for k in range(len(voltage)):
+        h = spans[k] / STEPS
+        fade = np.exp(-h * RESISTANCE / INDUCTANCE)
         out[k, 0] = shown if s[8] > 0 else w
         u = voltage[k]
         if s[6] > 0:

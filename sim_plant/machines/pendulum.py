@@ -38,18 +38,19 @@ STOP = 0.8
 
 
 @kernel()
-def run(voltage: FloatArray, s: FloatArray, out: FloatArray) -> None:
+def run(voltage: FloatArray, s: FloatArray, out: FloatArray, spans: FloatArray) -> None:
     """Angle [rad] at each sample.
 
     Args:
         voltage: commanded, held from sample to sample, shape (n,) [V].
         s: strengths of `EFFECTS`.
         out: angle, shape (n, 1).
+        spans: time from each sample to the next, shape (n,) [s].
     """
-    h = 1.0 / (RATE * STEPS)
     a, w, motor, turning = 0.0, 0.0, 0.0, 0.0
-    late = round(s[7] / h) if s[7] > 0 else 0
+    late = round(s[7] * RATE * STEPS) if s[7] > 0 else 0
     for k in range(len(voltage)):
+        h = spans[k] / STEPS
         out[k, 0] = a + s[10]
         for step in range(STEPS):
             u = voltage[max(k * STEPS + step - late, 0) // STEPS]

@@ -47,18 +47,19 @@ def _flows(v1: float, v2: float, flow: float, s: FloatArray) -> tuple[float, flo
 
 
 @kernel()
-def run(voltage: FloatArray, s: FloatArray, out: FloatArray) -> None:
+def run(voltage: FloatArray, s: FloatArray, out: FloatArray, spans: FloatArray) -> None:
     """Levels of both tanks [m] at each sample; the first sample is at rest.
 
     Args:
         voltage: of the pump, held from sample to sample, shape (n,) [V].
         s: strengths of `EFFECTS`.
         out: levels, shape (n, 2).
+        spans: time from each sample to the next, shape (n,) [s].
     """
-    h = 1.0 / (RATE * STEPS)
     v1, v2, shown, flow = 0.0, 0.0, 0.0, 0.0
     resting = round(1500 * RATE)
     for k in range(-resting, len(voltage)):
+        h = (spans[k] if k >= 0 else 1.0 / RATE) / STEPS
         if k >= 0:
             out[k, 0] = v1 / GROUND[0] + s[6]
             out[k, 1] = shown if s[7] > 0 else v2 / GROUND[1]

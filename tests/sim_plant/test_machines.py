@@ -41,19 +41,19 @@ def test_a_log_has_the_noise_that_is_asked_for_and_exact_commands():
 
 
 def test_the_speed_of_a_healthy_motor_settles_where_torque_and_back_emf_balance():
-    from sim_plant.machines.motor import CONSTANT, DAMPING, EFFECTS, RESISTANCE, run
+    from sim_plant.machines.motor import CONSTANT, DAMPING, EFFECTS, RATE, RESISTANCE, run
 
     out = np.empty((1000, 1))
-    run(np.full(1000, 6.0), np.zeros(len(EFFECTS)), out)
+    run(np.full(1000, 6.0), np.zeros(len(EFFECTS)), out, np.full(1000, 1 / RATE))
     settled = CONSTANT * 6.0 / (CONSTANT**2 + RESISTANCE * DAMPING)
     assert out[-1, 0] == pytest.approx(settled, rel=1e-6)
 
 
 def test_a_pendulum_hangs_where_torque_and_weight_balance():
-    from sim_plant.machines.pendulum import CONSTANT, EFFECTS, GRAVITY, RESISTANCE, run
+    from sim_plant.machines.pendulum import CONSTANT, EFFECTS, GRAVITY, RATE, RESISTANCE, run
 
     out = np.empty((1500, 1))
-    run(np.full(1500, 2.0), np.zeros(len(EFFECTS)), out)
+    run(np.full(1500, 2.0), np.zeros(len(EFFECTS)), out, np.full(1500, 1 / RATE))
     assert np.sin(out[-1, 0]) == pytest.approx(2.0 * CONSTANT / RESISTANCE / GRAVITY, rel=1e-4)
 
 
@@ -64,7 +64,7 @@ def test_a_pendulum_hangs_where_torque_and_weight_balance():
 )  # fmt: skip
 def test_tanks_settle_where_what_comes_in_goes_out(plant, holes):
     out = np.empty((3000, len(holes)))
-    plant.run(np.full(3000, 5.0), np.zeros(len(plant.EFFECTS)), out)
+    plant.run(np.full(3000, 5.0), np.zeros(len(plant.EFFECTS)), out, np.full(3000, 1 / plant.RATE))
     left = np.array(holes) * np.sqrt(2 * plant.FALL * out[-1])
     np.testing.assert_allclose(left, plant.PUMP * 5.0, rtol=1e-4)
 
@@ -72,7 +72,7 @@ def test_tanks_settle_where_what_comes_in_goes_out(plant, holes):
 def test_a_tank_that_nothing_fills_runs_dry_as_its_jet_slows():
     # A·dh/dt = −a·√(2·g·h): the speed of the jet falls linearly, to zero and no further.
     out, (upper, lower) = np.empty((60, 1)), zip(cascade.HOLES, cascade.GROUND, strict=True)
-    cascade.run(np.zeros(60), np.zeros(len(cascade.EFFECTS)), out)
+    cascade.run(np.zeros(60), np.zeros(len(cascade.EFFECTS)), out, np.full(60, 1 / cascade.RATE))
     speed = np.sqrt(2 * cascade.FALL * out[:, 0])
     hole, ground = upper
     empty = cascade.PUMP * cascade.RESTING / hole * ground / (cascade.FALL * hole)

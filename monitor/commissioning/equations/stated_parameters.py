@@ -27,5 +27,10 @@ def stated_in_si(name: str, written: Mapping[str, float]) -> dict[str, float]:
     return {n: float(unit_of(_unit(known[n])).to_si(value)) for n, value in written.items()}
 
 
+def units_of_parameters(name: str) -> dict[str, str]:
+    """The unit of each parameter of a model of equations, as its file writes them."""
+    return {parameter: _unit(known) for parameter, known in base_model(name).parameters.items()}
+
+
 def _unit(parameter: Parameter) -> str:
     return parameter.shown or parameter.unit

@@ -22,7 +22,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", help="a file, or the name of a shipped model")
     parser.add_argument(
         "--input", action="append", default=[], metavar="NAME=VALUE",
-        help="value of an input during the run, in the file's unit; may be repeated",
+        help="value of an input during the run, in the file's unit or one in brackets, such as"
+        " q=2[l/min]; may be repeated",
     )  # fmt: skip
     parser.add_argument(
         "--save", type=Path, metavar="FILE", help="draw the run into FILE.svg, one file an output"
@@ -35,8 +36,9 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.workbench.catalogue import model_report
 
     check_folder(arguments.save)
-    inputs = named_values("--input", arguments.input, "u=2.5")
     model = model_named(arguments.model)
+    units = {name: signal.shown or signal.unit for name, signal in model.inputs.items()}
+    inputs = named_values("--input", arguments.input, "u=2.5", units)
     report = model_report(model, inputs, arguments.model)
     lines = [*_lines(arguments.model, report), *_of_run(model, report), *plot_lines(report.run)]
     print_result(arguments, _plain(report), lines)

@@ -6,7 +6,7 @@ from rigwatch.commands.common.log_arguments import add_log_columns
 from rigwatch.commands.common.log_questions import LOGS, ask_for_logs, can_ask
 from rigwatch.commands.common.many_studies import add_studies, run_studies, the_study
 from rigwatch.commands.common.marks import marks_of
-from rigwatch.commands.common.named_values import named_values
+from rigwatch.commands.common.named_values import named_values, number_in_unit
 from rigwatch.commands.common.numbers import PORT, POSITIVE, number, whole
 from rigwatch.commands.common.operator_argument import add_user
 from rigwatch.commands.common.output import check_folder, print_json, print_result, say
@@ -42,6 +42,7 @@ __all__ = [
     "marks_of",
     "named_values",
     "number",
+    "number_in_unit",
     "print_json",
     "print_result",
     "ready_to_draw",

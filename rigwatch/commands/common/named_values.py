@@ -1,27 +1,66 @@
-"""Options of the form NAME=VALUE."""
+"""Options of the form NAME=VALUE, where a value may have a unit: m=0.141[kg]."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
+
+_WITH_UNIT = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*\[([^\]]+)\]")
 
 
-def named_values(option: str, given: Sequence[str], example: str) -> dict[str, float]:
-    """The numbers of an option that may be repeated, by name.
+def named_values(
+    option: str, given: Sequence[str], example: str, units: Mapping[str, str]
+) -> dict[str, float]:
+    """The numbers of an option that may be repeated, by name, each in the unit of its name.
 
     Args:
         option: its name, for errors.
-        given: texts of the form NAME=VALUE.
+        given: texts of the form NAME=VALUE or NAME=VALUE[UNIT].
         example: one, for errors.
+        units: unit of each name; a name that is not among them may have no unit.
 
     Raises:
-        ModelError: a text has another form.
+        ModelError: a text has another form, or its unit is not of the name's kind.
     """
     from rigwatch.wire.errors import ModelError
 
     found = {}
     for text in given:
         name, _, value = (part.strip() for part in text.partition("="))
-        try:
-            found[name] = float(value)
-        except ValueError:
+        number = number_in_unit(f"{option} {text}", name, value, units)
+        if number is None:
             expected = f"expected NAME=VALUE such as {example}"
-            raise ModelError(f"{option}: found {text!r}, {expected}") from None
+            raise ModelError(f"{option}: found {text!r}, {expected}")
+        found[name] = number
     return found
+
+
+def number_in_unit(option: str, name: str, value: str, units: Mapping[str, str]) -> float | None:
+    """The number that a text states, in the unit of its name; None if it states none.
+
+    Args:
+        option: the option and its text, for errors.
+        name: of the quantity.
+        value: a number, or a number and its unit in brackets.
+        units: unit of each name.
+
+    Raises:
+        ModelError: the unit is unknown or not of the name's kind, or the name is unknown.
+    """
+    from rigwatch.wire.errors import ModelError, nearest
+    from rigwatch.wire.units import UnitError, unit_of
+
+    with_unit = _WITH_UNIT.fullmatch(value)
+    if with_unit is None:
+        try:
+            return float(value)
+        except ValueError:
+            return None
+    if name not in units:
+        raise ModelError(f"{option}: found {name!r}{nearest(name, dict(units))}")
+    wanted = unit_of(units[name])
+    try:
+        own = unit_of(with_unit[2])
+    except UnitError as error:
+        raise ModelError(f"{option}: {error}") from None
+    if own.dimension != wanted.dimension:
+        raise ModelError(f"{option}: found {with_unit[2]}, expected a unit like {units[name]}")
+    return wanted.from_si(own.to_si(float(with_unit[1])))

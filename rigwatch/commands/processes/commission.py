@@ -64,8 +64,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="a parameter of the equations that you know, in its unit, such as the moving mass "
-        "that you have weighed: forces are in proportion to it",
+        help="a parameter of the equations that you know, in its unit or one in brackets such as "
+        "m=310[g]: the moving mass that you have weighed, to which forces are in proportion",
     )
     parser.add_argument(
         "--any-wiring",
@@ -126,14 +126,15 @@ def _stated(arguments: argparse.Namespace) -> dict[str, float]:
     Raises:
         ModelError: one is not NAME=VALUE, no parameter of the equations, or out of its bounds.
     """
-    from monitor.commissioning import stated_in_si
+    from monitor.commissioning import stated_in_si, units_of_parameters
     from rigwatch.wire.errors import ModelError
 
     if not arguments.set:
         return {}
     if arguments.scheme == "transfer" or arguments.plant == "inertia":
         raise ModelError("--set: found no model of equations, expected --scheme equations or auto")
-    stated = named_values("--set", arguments.set, "m=0.31")
+    units = units_of_parameters(arguments.equations)
+    stated = named_values("--set", arguments.set, "m=0.31", units)
     return stated_in_si(arguments.equations, stated)
 
 

@@ -11,6 +11,7 @@ from rigwatch.commands.common import (
     ask_for_logs,
     can_ask,
     file_or_name,
+    number_in_unit,
     print_json,
     say,
 )
@@ -63,8 +64,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="[LOG:]NAME=VALUE",
-        help="a parameter of the model that you know, in its unit; of one log alone if it is named;"
-        " or the name of a number that each log states beside its columns, such as m=mass[g]",
+        help="a parameter of the model that you know, in its unit or one in brackets such as"
+        " m=141[g]; of one log alone if it is named; or the name of a number that each log states"
+        " beside its columns, such as m=mass[g]",
     )
     add_log_columns(parser)
 
@@ -125,7 +127,7 @@ def _logs(arguments: argparse.Namespace) -> "Logs":
         rate=arguments.rate,
         columns=columns,
     )
-    known = _known(arguments.set)
+    known = _known(arguments.set, arguments.model) if arguments.set else _Known()
     return Logs(
         tuple(arguments.data),
         arguments.model,
@@ -152,23 +154,27 @@ class _Known:
     stated: dict[str, str] = field(default_factory=dict)
 
 
-def _known(given: list[str]) -> "_Known":
-    """The values of `--set`.
+def _known(given: list[str], model: str) -> "_Known":
+    """The values of `--set`, in the units of the model.
 
     Raises:
-        ModelError: a text is not NAME=VALUE, LOG:NAME=VALUE or NAME=NUMBER[UNIT].
+        ModelError: a text is not NAME=VALUE, LOG:NAME=VALUE or NAME=NUMBER[UNIT], or a unit is not
+            of the parameter's kind.
     """
+    from rigwatch.physics.engine.equations import model_named
     from rigwatch.wire.errors import ModelError
 
-    known = _Known()
+    known, parameters = _Known(), model_named(model).parameters
+    units = {name: parameter.shown or parameter.unit for name, parameter in parameters.items()}
     for text in given:
         name, _, value = (part.strip() for part in text.partition("="))
         log, _, name = (part.strip() for part in name.rpartition(":"))
-        try:
-            (known.of_log.setdefault(log, {}) if log else known.start)[name] = float(value)
-        except ValueError:
-            if log or not _NUMBER.fullmatch(value):
-                expected = "NAME=VALUE such as R=2.0, or the name of a number that each log states"
-                raise ModelError(f"--set: found {text!r}, expected {expected}") from None
+        number = number_in_unit(f"--set {text}", name, value, units)
+        if number is not None:
+            (known.of_log.setdefault(log, {}) if log else known.start)[name] = number
+        elif log or not _NUMBER.fullmatch(value):
+            expected = "NAME=VALUE such as R=2.0, or the name of a number that each log states"
+            raise ModelError(f"--set: found {text!r}, expected {expected}")
+        else:
             known.stated[name] = value
     return known

@@ -2,7 +2,7 @@
 
 from rigwatch.workbench.data.columns import Columns, bridged, copies
 from rigwatch.workbench.data.healthy_elements import with_elements
-from rigwatch.workbench.data.motion import along_motion, predicts_along_motion
+from rigwatch.workbench.data.motion import along_motion
 from rigwatch.workbench.data.next_rows import with_next_rows
 from rigwatch.workbench.data.noise import (
     METHODS,
@@ -15,6 +15,7 @@ from rigwatch.workbench.data.noise import (
     quiet_scale,
 )
 from rigwatch.workbench.data.one_rate import ALIKE as RATES_ALIKE
+from rigwatch.workbench.data.prediction import predicts_along_motion
 from rigwatch.workbench.data.proposals import (
     Part,
     proposed_low_pass,

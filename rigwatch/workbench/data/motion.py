@@ -4,7 +4,7 @@ With unknown initial pressures, fluxes or temperatures free runs drift. Driven b
 motion these states converge within a fraction of a second, and a whole recording is one run without
 windows. This form is used if channels measure some but not all of a model's states, at least one
 output remains to be predicted, and no parameter is lost on which a free run depends; a study can
-request either form (`prediction`).
+request either form (`prediction.py`).
 """
 
 from collections.abc import Mapping
@@ -17,10 +17,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from rigwatch.physics.engine.equations import (
     Model,
     along_measured_motion,
-    has_hidden_states,
     measured_states,
-    predicted_outputs,
-    unjudged_along_motion,
     unmoved_at_rest,
 )
 from rigwatch.physics.engine.fit import (
@@ -58,16 +55,6 @@ LATE = (
     " motion is shifted by that"
 )
 FORM = "predicted along the measured motion: {shown} drive the model, {hidden} are simulated"
-
-
-def predicts_along_motion(study: Study) -> bool:
-    """Whether a study is predicted along its measured motion."""
-    if study.file.prediction != "auto":
-        return study.file.prediction == "measured motion"
-    model = study.model
-    if model.rough or not (has_hidden_states(model) and predicted_outputs(model)):
-        return False
-    return not unjudged_along_motion(model)
 
 
 def along_motion(study: Study, data: Data) -> tuple[Study, Data]:

@@ -20,6 +20,10 @@ MOST_LOST = 0.5
 """Share of samples up to which interpolated ones stand for lost rows; beyond, all are moved."""
 INTERPOLATED = "samples are interpolated, as their times are uneven"
 """How a recording is altered that an import has put on a uniform grid."""
+MEAN_AT = 0.25
+"""Highest frequency over the rate at which interpolated samples show their noise. Each mixes two
+neighbours, so that the density of white noise becomes r0 + 2 r1 cos(2 pi f): its mean, r0, stands
+at a quarter of the rate, more below, less above."""
 LARGEST = 1e70
 """Largest value that counts as measured [SI]: the fourth power is summed over a recording."""
 
@@ -59,7 +63,9 @@ def read_columns(folder: Path, span: Span) -> Columns:
     units = {column.name: column.unit for block in blocks for column in block.channels}
     cut = {name: in_si(column[begin:end], units[name]) for name, column in values.items()}
     measured = {name: _measurable(column) for name, column in cut.items()}
-    return Columns(dt, measured, units, (INTERPOLATED,) if moved else ())
+    if moved:
+        return Columns(dt, measured, units, (INTERPOLATED,), MEAN_AT)
+    return Columns(dt, measured, units)
 
 
 def _share_interpolated(blocks: Sequence[SampleBlock]) -> float:

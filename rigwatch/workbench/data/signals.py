@@ -21,6 +21,12 @@ from rigwatch.workbench.data.one_rate import on_one_rate
 from rigwatch.workbench.data.openings import without_openings
 from rigwatch.workbench.data.recorded_columns import read_columns, with_derived
 from rigwatch.workbench.data.signal_units import check_unit
+from rigwatch.workbench.data.whole_windows import (
+    counted_length,
+    ends_of_holes,
+    last_values,
+    of_length,
+)
 from rigwatch.workbench.study import Span, Study, StudyFile
 
 USUAL = 0.5
@@ -176,10 +182,10 @@ def _on_one_rate(
 def _recording(
     study: Study, tables: Sequence[Columns], horizon: int, use: str, remarks: list[str]
 ) -> Recording:
-    """Parts joined in sequence, each cut to whole windows so that no window spans two parts."""
+    """Parts joined in sequence, each of whole windows so that no window spans two parts."""
     inputs, outputs, beyond = [], [], list[float]()
     for table in tables:
-        length = len(table) // horizon * horizon if study.model.states else len(table)
+        length = counted_length(study, len(table), horizon)
         if length == 0:
             raise ModelError(
                 f"{use}: found {len(table)} samples, expected at least one horizon of {horizon}"
@@ -188,29 +194,37 @@ def _recording(
         if length < len(table):
             beyond.append((len(table) - length) * table.dt)
         u, y = _matched(study, table)
-        inputs.append(u[:length])
-        outputs.append(without_ends(study, y, table.dt)[:length])
+        inputs.append(of_length(length, u, filler=last_values(u)))
+        outputs.append(of_length(length, without_ends(study, y, table.dt), filler=np.nan))
     if beyond:
-        remarks.append(_beyond(use, beyond, horizon * tables[0].dt))
+        share = sum(beyond) / sum(len(table) * table.dt for table in tables)
+        remarks.append(_beyond(use, beyond, share, horizon * tables[0].dt))
     thin = study.file.thin
     parts = tuple(len(u) for u in inputs)
     thinning = Thinning(thin.factor, thin.edge, parts) if thin else None
     u, y = np.concatenate(inputs), np.concatenate(outputs)
+    breaks = ends_of_holes(u)
     u, y = _without_holes(study.model, u, y, horizon, use=use, remarks=remarks)
     if use != "openings":
         _check_excitation(study.model, u, use)
     ends = [name for name, held in study.holds.items() if held.ends]
     passed = min(table.passed for table in tables)
-    made = Recording(tables[0].dt, u, y, thinning, parts, passed=passed)
+    made = Recording(tables[0].dt, u, y, thinning, parts, passed=passed, breaks=breaks)
     return with_next_rows(study.model, made, ends)
 
 
-def _beyond(use: str, spans: Sequence[float], horizon: float) -> str:
-    """The remark on ends of recordings that fill no horizon; all times in seconds."""
+def _beyond(use: str, spans: Sequence[float], share: float, horizon: float) -> str:
+    """The remark on ends of recordings that fill no horizon; all times in seconds.
+
+    `share` is that of all samples.
+    """
     which = f"{spans[0]:.3g} s of a recording"
     if len(spans) > 1:
         which = f"{min(spans):.3g} to {max(spans):.3g} s of {len(spans)} recordings"
-    return f"{use}: the last {which} are not counted, {UNFILLED} of {horizon:g} s"
+    return (
+        f"{use}: the last {which} are not counted, {UNFILLED} of {horizon:g} s; {1 - share:.1%} of"
+        " the samples are used"
+    )
 
 
 def _matched(study: Study, table: Columns) -> tuple[FloatArray, FloatArray]:

@@ -133,10 +133,15 @@ def _in_few(residual: FloatArray) -> tuple[int, float]:
 
 
 def uncalibrated(bench: Bench) -> list[str]:
-    """How the recordings differ from those on which verdicts are calibrated, in words."""
+    """How the recordings differ from those on which verdicts are calibrated, in words.
+
+    Logs with lost rows, uneven times or clocks that differ have a calibration of their own, of
+    first verdicts on free runs.
+    """
     count = int(np.isfinite(bench.data.held_out.outputs).any(axis=1).sum())
     short = [f"only {count} held-out samples count"] if count < SHORT else []
-    return [*bench.data.altered, *short]
+    counted = not (bench.data.along_motion or bench.study.file.effects)
+    return [*([] if counted else bench.data.altered), *short]
 
 
 def with_base_offered(bench: Bench, found: Verdict) -> Verdict:

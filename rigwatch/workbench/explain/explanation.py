@@ -13,9 +13,11 @@ from rigwatch.workbench.explain.verdict_calibration import (
     LATER_COUNTS,
     cases_seen,
     cases_seen_along,
+    cases_seen_logged,
     later_probability_wrong,
     most_probably_wrong,
     probability_wrong_along,
+    probability_wrong_logged,
 )
 from rigwatch.workbench.fit import Value, as_written, values
 from rigwatch.workbench.ranking import Ranked, vanishing_shape
@@ -77,6 +79,8 @@ class Explanation:
             comparison's `told_in`.
         wrong_at_most: upper bound of that probability, 95 %; None as above.
         unlike: why no simulated case is like this one, in words; empty if some are.
+        altered: how the logs differ from faultless ones, in words; `like_this` counts such logs
+            where `unlike` is empty.
         remains: share of the error's energy above the noise floor that a missing effect leaves, so
             that more is missing; 0 if it, or the set that it was judged in, explains the error.
         exchange: an effect that describes the last accepted one better, if nothing beside it
@@ -98,6 +102,7 @@ class Explanation:
     wrong_at_most: float | None = None
     unlike: str = ""
     remains: float = 0.0
+    altered: list[str] = field(default_factory=list)
 
 
 def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanation:
@@ -128,6 +133,7 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         wrong_at_most=most,
         unlike=unlike,
         remains=_remains(bench, verdict),
+        altered=list(bench.data.altered),
     )
 
 
@@ -183,6 +189,8 @@ def _reliability(bench: Bench, verdict: Verdict) -> tuple[float | None, tuple[in
     if bench.data.along_motion:
         counted = cases_seen_along(verdict.word, rough=rough)
         return probability_wrong_along(verdict.word, rough=rough), counted
+    if bench.data.altered and not later:
+        return probability_wrong_logged(verdict.word), cases_seen_logged(verdict.word)
     if later:
         return later_probability_wrong(), LATER_COUNTS
     return verdict.probability_wrong, cases_seen(verdict.word, verdict.evidence)

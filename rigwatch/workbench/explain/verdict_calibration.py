@@ -10,6 +10,10 @@ the verdicts of each cell on simulated plants and how many were wrong. With k of
 Other cells say nothing of a cell with few cases, and below `FEWEST` no probability is stated.
 `benchmarks/explaining/hidden_effects` writes the file and evaluates it on held-out seeds.
 
+First verdicts on logs that have lost rows, uneven times or clocks that differ are counted apart,
+in `calibration_logged.toml`, by word: `benchmarks/explaining/user_logs` counts them on six
+simulated machines, and compares each with what the five others promise.
+
 Verdicts along the measured motion are counted apart, in `calibration_along.toml`, by word and by
 whether the model is rough: there the share that is left holds the model's own error.
 `benchmarks/family/along_calibration` counts them on simulated rigs and evaluates them on rigs of
@@ -36,6 +40,7 @@ FEWEST = 30
 CONFIDENCE = 0.95
 FILE = "calibration.toml"
 ALONG_FILE = "calibration_along.toml"
+LOGGED_FILE = "calibration_logged.toml"
 LATER_COUNTS = (78, 4)
 """Number of verdicts on later steps, after an effect was added, and how many were wrong: chains of
 two and three hidden effects on five simulated machines (`benchmarks/explaining/chains`). Later
@@ -91,6 +96,20 @@ class AlongCalibration(Section, frozen=True, kw_only=True):
     cells: list[AlongCell]
 
 
+class LoggedCell(Section, frozen=True, kw_only=True):
+    """Counts of first verdicts on logs of real loggers."""
+
+    word: Annotated[str, Meta(description="the verdict")]
+    cases: Annotated[int, Meta(ge=0, description="simulated cases with such a verdict")]
+    wrong: Annotated[int, Meta(ge=0, description="those where it was wrong")]
+
+
+class LoggedCalibration(Section, frozen=True, kw_only=True):
+    """The file of such logs."""
+
+    cells: list[LoggedCell]
+
+
 def cell_of(word: str, evidence: Evidence) -> tuple[str, int, int]:
     """The cell of a verdict: word, index of `left`, index of `margin`."""
     left = int(np.searchsorted(LEFT_EDGES, max(evidence.left, 0.0)))
@@ -112,6 +131,13 @@ def cases_seen_along(word: str, *, rough: bool) -> tuple[int, int]:
     return _along_counts().get((rough, word), (0, 0))
 
 
+def cases_seen_logged(word: str) -> tuple[int, int]:
+    """Number of first verdicts with the same word on logs with lost rows, uneven times or other
+    clocks, and how many were wrong.
+    """
+    return _logged_counts().get(word, (0, 0))
+
+
 def probability_wrong_along(word: str, *, rough: bool) -> float | None:
     """Probability that a verdict along the measured motion is wrong; None without such a case."""
     cases, wrong = cases_seen_along(word, rough=rough)
@@ -121,6 +147,12 @@ def probability_wrong_along(word: str, *, rough: bool) -> float | None:
 def probability_wrong(word: str, evidence: Evidence) -> float:
     """Probability that the verdict is wrong; 0.5 if its cell has no simulated case."""
     return _rate(*cases_seen(word, evidence))
+
+
+def probability_wrong_logged(word: str) -> float | None:
+    """Probability that such a verdict is wrong; None without such a case."""
+    cases, wrong = cases_seen_logged(word)
+    return _rate(cases, wrong) if cases else None
 
 
 def most_probably_wrong(cases: int, wrong: int) -> float | None:
@@ -144,6 +176,12 @@ def _counts() -> dict[tuple[str, int, int], tuple[int, int]]:
 def _along_counts() -> dict[tuple[bool, str], tuple[int, int]]:
     cells = parse(_text(ALONG_FILE), AlongCalibration, ALONG_FILE).cells
     return {(c.rough, c.word): (c.cases, c.wrong) for c in cells}
+
+
+@cache
+def _logged_counts() -> dict[str, tuple[int, int]]:
+    cells = parse(_text(LOGGED_FILE), LoggedCalibration, LOGGED_FILE).cells
+    return {c.word: (c.cases, c.wrong) for c in cells}
 
 
 def _text(name: str) -> str:

@@ -190,7 +190,12 @@ def doubt_of(found: Explanation) -> str:
         )
     if not cases:
         return "the probability of being wrong is unknown: no simulated case is similar to this one"
-    were = f"of {cases} similar simulated cases {wrong} {'was' if wrong == 1 else 'were'} wrong"
+    kind = (
+        "verdicts on simulated logs with such faults"
+        if found.altered
+        else "similar simulated cases"
+    )
+    were = f"of {cases} {kind} {wrong} {'was' if wrong == 1 else 'were'} wrong"
     if found.wrong_at_most is None:
         return f"the probability of being wrong is unknown: {were}, which are too few"
     return f"probability of being wrong at most {found.wrong_at_most:.1%}: {were}"

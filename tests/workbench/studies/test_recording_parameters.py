@@ -145,6 +145,24 @@ def stating(folder: Path, factor: float = 1.0) -> list[str]:
     return paths
 
 
+@pytest.mark.parametrize("name", ["m", "full:m"])
+def test_a_known_value_may_have_a_unit_of_its_own(tmp_path: Path, capsys, name: str) -> None:
+    begin = ["study", "new", str(tmp_path / "study"), "--data", *stating(tmp_path)]
+    begin += ["--model", str(tmp_path / "model.toml")]
+    assert main([*begin, "--set", f"{name}=0.141[kg]"]) == 0
+    file = open_study(tmp_path / "study").file
+    known = {span.session: span.parameters for span in (*file.train, *file.held_out)}
+    # In the study's file in the model's unit, g; what is read from it is in SI.
+    found = file.start["m"] if name == "m" else known["full.mcap"]["m"]
+    assert found == pytest.approx(0.141)
+    shutil.rmtree(tmp_path / "study")
+    assert main([*begin, "--set", f"{name}=0.141[s]"]) == 2
+    told = f"--set {name}=0.141[s]: found s, expected a unit like g"
+    assert told in capsys.readouterr().err
+    assert main([*begin, "--set", f"{name}=0.141[kilo]"]) == 2
+    assert "the unknown unit 'kilo'" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(("text", "factor"), [("m=rig.load[kg]", 1.0), ("m=rig.load", 1e3)])
 def test_a_parameter_is_a_number_that_each_log_states(
     tmp_path: Path, text: str, factor: float

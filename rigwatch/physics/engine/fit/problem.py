@@ -143,10 +143,10 @@ class Problem:
 
     @cached_property
     def first_windows(self) -> IntArray:
-        """The first window of each recording."""
-        ends = np.cumsum(self.recording.parts or (len(self.recording),))
-        begins = np.concatenate([[0], ends[:-1]])
-        return np.unique(np.searchsorted(self._cut.starts, begins))
+        """The first window of each recording, and of what follows a time of unknown inputs."""
+        begins = [part.start for part in self.recording.slices] + [*self.recording.breaks]
+        first = np.unique(np.searchsorted(self._cut.starts, begins))
+        return np.asarray(first[first < len(self._cut.starts)], np.int64)
 
     @cached_property
     def window_order(self) -> list[IntArray]:

@@ -24,7 +24,9 @@ class Recording:
         parts: lengths of the concatenated recordings; a single one if empty.
         driving: leading inputs that drive the rig, before those of its measured motion; None if
             all do.
-        passed: frequency up to which the outputs are not low-passed, over the rate.
+        passed: frequency up to which the outputs keep their noise, over the rate.
+        breaks: samples before which inputs are unknown for a while, so that hidden states begin
+            anew in the next window.
     """
 
     dt: float
@@ -34,6 +36,7 @@ class Recording:
     parts: tuple[int, ...] = ()
     driving: int | None = None
     passed: float = 0.5
+    breaks: tuple[int, ...] = ()
 
     def __len__(self) -> int:
         return len(self.inputs)
@@ -100,14 +103,22 @@ def joined(recordings: Sequence[Recording]) -> Recording:
         np.concatenate([getattr(each, signals) for each in recordings])
         for signals in ("inputs", "outputs")
     )
-    return replace(first, inputs=inputs, outputs=outputs, parts=tuple(map(len, recordings)))
+    lengths = tuple(map(len, recordings))
+    begins = np.cumsum([0, *lengths[:-1]]).tolist()
+    breaks = tuple(
+        begin + at for begin, each in zip(begins, recordings, strict=True) for at in each.breaks
+    )
+    return replace(first, inputs=inputs, outputs=outputs, parts=lengths, breaks=breaks)
 
 
 def beginning(recording: Recording, samples: int) -> Recording:
     """The first samples of a recording, as one part."""
     inputs, outputs = recording.inputs[:samples], recording.outputs[:samples]
     thinning = recording.thinning and recording.thinning.of_part(len(inputs))
-    return replace(recording, inputs=inputs, outputs=outputs, thinning=thinning, parts=())
+    breaks = tuple(at for at in recording.breaks if at < len(inputs))
+    return replace(
+        recording, inputs=inputs, outputs=outputs, thinning=thinning, parts=(), breaks=breaks
+    )
 
 
 def cut_for(system: System, recording: Recording, horizon: int, *, apart: bool = False) -> Windows:

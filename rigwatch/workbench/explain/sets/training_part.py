@@ -123,7 +123,7 @@ def _part(bench: Bench) -> TrainingPart | None:
     rows = (cut.starts[chosen][:, None] + np.arange(cut.length)).ravel()
     train = replace(
         whole, inputs=whole.inputs[rows], outputs=whole.outputs[rows],
-        parts=tuple(count * cut.length for _, count in stretches),
+        parts=tuple(count * cut.length for _, count in stretches), breaks=(),
     )  # fmt: skip
     return TrainingPart(replace(data, train=train), chosen)
 
