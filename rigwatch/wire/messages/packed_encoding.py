@@ -4,7 +4,8 @@ The bytes are those of `protobuf.encode`, which makes a Python object of every n
 module does not recognise is left to it.
 """
 
-from collections.abc import Iterator, Sequence
+import struct
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -65,13 +66,20 @@ def _is_plain(block: Block, times: list[NDArray[np.int64]], columns: Sequence[Co
     )
 
 
-def _rows(tag: bytes, table: ColumnTable) -> Iterator[bytes]:
+def _rows(tag: bytes, table: ColumnTable) -> list[bytes]:
     """The bytes of each column's head and of its values."""
-    values = table.values.tobytes()
     size = table.values.itemsize * table.values.shape[1]
-    for place, head in enumerate(_heads(tag, table.names, size)):
-        yield head
-        yield values[place * size : (place + 1) * size]
+    heads = _heads(tag, table.names, size)
+    parts = [b""] * (2 * len(heads))
+    parts[::2] = heads
+    parts[1::2] = _cutter(len(heads), size).unpack(table.values.tobytes())
+    return parts
+
+
+@lru_cache(maxsize=TABLES_KEPT)
+def _cutter(count: int, size: int) -> struct.Struct:
+    """Cuts the bytes of a table into those of its columns; a slice for each costs more."""
+    return struct.Struct(f"{size}s" * count)
 
 
 @lru_cache(maxsize=TABLES_KEPT)

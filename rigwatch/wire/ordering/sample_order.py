@@ -79,12 +79,31 @@ class SampleOrder(Generic[S]):
 
     def on_block(self, block: S) -> list[Outcome[S]]:
         """Process a block received from the bus."""
+        if self._goes_on(block):
+            return [block]
         if 0 <= block.seq <= LARGEST_SEQ - len(block):
             if len(block):
                 self._admit(block)
         else:
             self.counters.foreign += len(block)
         return self._outcomes()
+
+    def _goes_on(self, block: S) -> bool:
+        """Deliver a block that simply follows the last one, as nearly all do.
+
+        What the other steps would do with it, in a quarter of their time.
+        """
+        front, count = self._line[0] if self._line else None, len(block)
+        if front is None or block.seq != front.next or block.boot != front.boot or not count:
+            return False
+        if front.waiting or front.ended or block.seq > LARGEST_SEQ - count:
+            return False
+        if not self.sources.goes_on(block):
+            return False
+        self._heard_since_ask, self._stale = True, 0
+        front.next += count
+        self.counters.delivered += count
+        return True
 
     def on_reply(self, ask: Ask, reply: RingReply[S] | None) -> list[Outcome[S]]:
         """Process the ring's reply to `ask`; None if there was none."""
