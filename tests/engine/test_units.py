@@ -226,6 +226,24 @@ def test_the_gram_where_gravity_is_meant_gets_a_hint(unit: str) -> None:
     assert fine.parameters["gravity"].value == 9.80665
 
 
+@pytest.mark.parametrize(
+    ("expression", "hint"),
+    [
+        pytest.param("m*9.81", "(a number has no unit: make it a parameter", id="a number"),
+        pytest.param("load - 20", "(a number has no unit: make it a parameter", id="one taken off"),
+        pytest.param("m*position", "", id="neither"),
+    ],
+)
+def test_a_mass_in_grams_gets_the_hint_that_its_equation_needs(expression: str, hint: str) -> None:
+    text = SPRING.replace('"k*position + load"', f'"{expression}"')
+    text += '[parameters.m]\nvalue = 2.0\nunit = "g"\n'
+    with pytest.raises(ModelError, match="found") as refused:
+        compose(parse(text, Model, "spring"))
+    assert "is the gram" not in str(refused.value)
+    assert hint in str(refused.value)
+    assert hint or "no unit" not in str(refused.value)
+
+
 def test_the_same_model_in_other_units_has_the_same_fit() -> None:
     position = np.sin(np.arange(400) / 9)[:, None] * 1e-3
     force = 3e6 * position + 5.0 * np.random.default_rng(1).normal(size=(400, 1))

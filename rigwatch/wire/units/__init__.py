@@ -11,6 +11,7 @@ from rigwatch.wire.units.unit import (
     names_gram,
     times,
     unit_of,
+    with_gravity,
 )
 from rigwatch.wire.units.unit_table import Dimension
 
@@ -27,4 +28,5 @@ __all__ = [
     "names_gram",
     "times",
     "unit_of",
+    "with_gravity",
 ]

@@ -19,6 +19,7 @@ from rigwatch.wire.units.unit_table import BASES, ENTRIES, IN_OTHER_WORDS, Dimen
 
 NONE: Dimension = (Fraction(0),) * len(BASES)
 """Of a pure number."""
+_GRAM = re.compile(r"(?<![A-Za-z])m?g(?![A-Za-z0-9])")
 GRAM = "the unit g is the gram, write g0 for standard gravity"
 _POWER = r"-?\d+(?:\.\d+)?|\(-?\d+(?:\.\d+|/[1-9]\d?)?\)"
 _EXPONENT = rf"(?:(?:\^|\*\*)(?P<{{0}}>{_POWER}))?"
@@ -231,4 +232,9 @@ def _written(exponent: Fraction) -> str:
 
 def names_gram(text: str) -> bool:
     """Whether a unit contains the symbol of the gram, often misread as standard gravity."""
-    return bool(re.search(r"(?<![A-Za-z])m?g(?![A-Za-z0-9])", text))
+    return bool(_GRAM.search(text))
+
+
+def with_gravity(text: str) -> str:
+    """A unit with standard gravity in place of the gram."""
+    return _GRAM.sub("g0", text)
