@@ -10,7 +10,8 @@ HEAD = """<!-- Printed by `make docs` from rigwatch/physics/effects. -->
 {count} effects, each an expression at a port of a model ([models](models.md#ports)). `rigwatch
 effects NAME` describes and draws one: force against position and speed, response to a step. "Looks
 like" names effects that may explain the same recording; `rigwatch explain` reports when it cannot
-distinguish them. Effects marked ° are rarer: a study tries them with `whole_library = true`.
+distinguish them. Effects marked ° are rarer: a study tries them with `whole_library = true`,
+and `explain` by itself where no usual one explains the error.
 
 At a force port the expression is the added force as a function of the port's variables: `x` and `v`
 motion, `L` load, `p` pressure or level, `T` temperature, `i` current, `psi` flux linkage. At a

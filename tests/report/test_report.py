@@ -14,7 +14,7 @@ from rigwatch.page.scale import Scale, limits
 from rigwatch.page.svg import Plot
 from rigwatch.workbench.explain.verdict_calibration import LATER_COUNTS, later_probability_wrong
 from rigwatch.workbench.fit import Value
-from rigwatch.workbench.report import explanation_lines, next_command
+from rigwatch.workbench.report import explanation_lines, next_command, next_step
 from rigwatch.workbench.report.html_report import gather, report_html
 from rigwatch.workbench.report.sections import headline
 from rigwatch.workbench.report.text_report import doubt_of
@@ -155,6 +155,19 @@ def test_a_named_effect_has_its_strength_and_the_command_that_adds_it(study: Stu
     assert "  coulomb@load: Fc = 0.43 N (0.41 … 0.45)" in explanation_lines(named)
     assert next_command(named, "rub") == "rigwatch add rub coulomb --port load --with lag@drive"
     assert next_command(replace(named, verdict="undetermined"), "rub") == ""
+
+
+def test_what_to_do_next_is_told_where_the_recordings_do_not_decide(study: Study) -> None:
+    found = replace(gather(study).explanation, verdict="undetermined", next_experiment=None)
+    best = replace(found.ranking[0], effect="coulomb", port="load")
+    told = next_step(replace(found, ranking=[best]), "rub")
+    assert told == (
+        "record another motion, list it under [[train]] in rub/study.toml, and explain again; or,"
+        " if you know that it is coulomb@load: rigwatch add rub coulomb --port load"
+    )
+    named = replace(found, verdict="missing_effect", ranking=[best])
+    assert next_step(named, "rub") == next_command(named, "rub")
+    assert next_step(replace(found, verdict="nothing_missing"), "rub") == ""
 
 
 def test_that_more_is_missing_than_the_effect_named_is_in_the_headline(study: Study) -> None:

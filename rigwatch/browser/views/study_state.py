@@ -9,8 +9,8 @@ import msgspec
 from rigwatch.browser.work import Results, results_of
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Comparison
-from rigwatch.workbench.explain import Explanation
-from rigwatch.workbench.study import Study, check_data, digest, lines, open_study
+from rigwatch.workbench.explain import Explanation, still_holds
+from rigwatch.workbench.study import Study, check_data, digest, lines, open_study, refusals
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,12 +113,27 @@ def state_of(folder: Path, name: str, step: int | None = None) -> State:
         for k, one in enumerate(kept)
     ]
     results = kept[shown]
-    told = results.read("explanation")
+    explanation = _explanation(whole, results) if shown == count else _stored(results)
     return State(
         models[shown], name, whole, shown, steps, results,
-        None if told is None else msgspec.convert(told, Explanation, strict=False),
+        explanation,
         results.read("evidence") or {}, list(lines(whole)), _changed(whole),
     )  # fmt: skip
+
+
+def _stored(results: Results) -> Explanation | None:
+    told = results.read("explanation")
+    return None if told is None else msgspec.convert(told, Explanation, strict=False)
+
+
+def _explanation(study: Study, results: Results) -> Explanation | None:
+    """The stored explanation; None once `add` has refused what it names."""
+    found = _stored(results)
+    if found is None or not found.ranking:
+        return found
+    label = f"{found.ranking[0].effect}@{found.ranking[0].port}"
+    holds = still_holds(found.verdict, label, found.beside, refusals(study))
+    return found if holds else None
 
 
 def _changed(study: Study) -> str:

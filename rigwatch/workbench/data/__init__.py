@@ -15,7 +15,7 @@ from rigwatch.workbench.data.noise import (
     quiet_scale,
 )
 from rigwatch.workbench.data.one_rate import ALIKE as RATES_ALIKE
-from rigwatch.workbench.data.prediction import predicts_along_motion
+from rigwatch.workbench.data.prediction import form_along_motion, predicts_along_motion
 from rigwatch.workbench.data.proposals import (
     Part,
     proposed_low_pass,
@@ -41,6 +41,7 @@ __all__ = [
     "copies",
     "expected_error",
     "find_period",
+    "form_along_motion",
     "from_residual",
     "held_out_floor",
     "lowered",

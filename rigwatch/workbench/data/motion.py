@@ -28,6 +28,7 @@ from rigwatch.physics.engine.fit import (
 )
 from rigwatch.physics.transfer import SensorPhase
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.workbench.data.prediction import form_along_motion
 from rigwatch.workbench.data.signals import Data, MotionSensor
 from rigwatch.workbench.study import Study
 
@@ -54,7 +55,6 @@ LATE = (
     "{channel} is {late:.2g} ms {side} what measures its rate, on the healthy recording: its"
     " motion is shifted by that"
 )
-FORM = "predicted along the measured motion: {shown} drive the model, {hidden} are simulated"
 
 
 def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
@@ -88,8 +88,7 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
     train, held_out = made(data.train), made(data.held_out)
     openings = made(data.openings) if data.openings is not None else None
     longest = max(len(r) for r in (train, held_out, healthy) if r is not None)
-    shown = ", ".join(state.name for state in measured_states(study.model))
-    form = FORM.format(shown=shown, hidden=", ".join(model.states) or "no states")
+    form = form_along_motion(study.model)
     told: tuple[str, ...] = () if healthy is not None else (UNCHECKED,)
     told += tuple(_lateness_remark(channel, late[channel]) for channel in late)
     remarks = (*data.remarks, form, *told, *motion_range_remarks(study, train, held_out, healthy))

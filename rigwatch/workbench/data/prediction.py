@@ -1,11 +1,18 @@
 """How a study is predicted: by a free run, or along its measured motion."""
 
 from rigwatch.physics.engine.equations import (
+    Model,
     has_hidden_states,
+    measured_states,
     predicted_outputs,
     unjudged_along_motion,
 )
 from rigwatch.workbench.study import Study
+
+FORM = (
+    "predicted along the measured motion: {shown} drive the model, {hidden} are simulated;"
+    ' prediction = "free" as the first line of the study predicts every output by a free run'
+)
 
 
 def predicts_along_motion(study: Study) -> bool:
@@ -16,3 +23,10 @@ def predicts_along_motion(study: Study) -> bool:
     if model.rough or not (has_hidden_states(model) and predicted_outputs(model)):
         return False
     return not unjudged_along_motion(model)
+
+
+def form_along_motion(model: Model) -> str:
+    """What drives a model along its measured motion and what is simulated, in words."""
+    shown = [state.name for state in measured_states(model)]
+    hidden = [name for name in model.states if name not in shown]
+    return FORM.format(shown=", ".join(shown), hidden=", ".join(hidden) or "no states")

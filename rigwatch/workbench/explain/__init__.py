@@ -3,7 +3,15 @@
 compare ──▶ rank ──▶ pairs ──▶ verdict (calibrated) ──▶ next experiment, where undetermined
 """
 
-from rigwatch.workbench.explain.explain import Explained, explain, explained, ranking
+from rigwatch.workbench.explain.credibility import still_holds
+from rigwatch.workbench.explain.explain import (
+    Explained,
+    explain,
+    explained,
+    ranking,
+    tries_rarer,
+    with_whole_library,
+)
 from rigwatch.workbench.explain.explanation import Explanation, Row, as_data, explanation
 from rigwatch.workbench.explain.sets.set_gain import SetGain, set_gain
 from rigwatch.workbench.explain.verdict import Verdict, judge
@@ -21,4 +29,7 @@ __all__ = [
     "judge",
     "ranking",
     "set_gain",
+    "still_holds",
+    "tries_rarer",
+    "with_whole_library",
 ]

@@ -8,20 +8,26 @@ What `add` refused in the study's present state is not named as missing: there t
 anew with the effect, and lost what a single fit had gained.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from rigwatch.workbench.compare import Bench, apparent_strength
 from rigwatch.workbench.explain.verdict import Verdict, judge
 from rigwatch.workbench.ranking import Ranked
-from rigwatch.workbench.study import refusals
+from rigwatch.workbench.study import Refusals
 
 STRONGER = 3.0
 """Smallest ratio of an effect's strength to its apparent strength on the healthy recording."""
 
 
-def credible_verdict(bench: Bench, rows: list[Ranked]) -> Verdict:
-    """The verdict among the credible effects; the others are no longer accepted."""
-    refused = refusals(bench.study)
+def credible_verdict(bench: Bench, rows: list[Ranked], refused: Refusals) -> Verdict:
+    """The verdict among the credible effects; the others are no longer accepted.
+
+    Args:
+        bench: the study.
+        rows: the ranking.
+        refused: what `add` refused in the study's present state.
+    """
     for row in rows:
         if row.accepted and (reason := refused.get((row.label,))) is not None:
             row.accepted, row.reason = False, f"as `add` found: {reason}"
@@ -33,15 +39,27 @@ def credible_verdict(bench: Bench, rows: list[Ranked]) -> Verdict:
     return verdict
 
 
-def unless_refused(bench: Bench, verdict: Verdict) -> Verdict:
+def unless_refused(refused: Refusals, verdict: Verdict) -> Verdict:
     """The verdict; `unknown_effect` if `add` refused the set in which it names an effect."""
     if verdict.word != "missing_effect" or verdict.best is None:
         return verdict
-    reason = refusals(bench.study).get((verdict.best.label, *sorted(verdict.beside)))
+    reason = refused.get((verdict.best.label, *sorted(verdict.beside)))
     if reason is None:
         return verdict
     text = f"{verdict.text}; but `add` found: {reason}"
     return replace(verdict, word="unknown_effect", text=text)
+
+
+def still_holds(word: str, label: str, beside: Sequence[str], refused: Refusals) -> bool:
+    """Whether `add` has not refused since what an explanation names.
+
+    Args:
+        word: the verdict.
+        label: the effect that it names, as "effect@port".
+        beside: the others of its set.
+        refused: what `add` refused in the study's present state.
+    """
+    return word != "missing_effect" or (label, *sorted(beside)) not in refused
 
 
 def apparent_when_healthy(bench: Bench, row: Ranked) -> bool:

@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass, replace
 
+from msgspec import structs
+
 from rigwatch.workbench.compare import (
     Bench,
     Decided,
     open_bench,
     with_hold_decided,
 )
+from rigwatch.workbench.data import predicts_along_motion
 from rigwatch.workbench.explain.adequacy import (
     inadequate,
     stopped_by_outliers,
@@ -42,9 +45,15 @@ from rigwatch.workbench.ranking import (
     own_floor,
     rank,
     rank_all,
+    suitable,
     with_refinements,
 )
-from rigwatch.workbench.study import Study, told
+from rigwatch.workbench.study import Refusals, Study, refusals, told
+
+RARER = "{text}; it was found among {count} rarer effects, as no usual one explains the error"
+BY_CHANCE = 0.05
+"""Probability below which a rarer effect's score is more than chance."""
+SECOND_PASS = "the effect was found in a second pass"
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,10 +92,57 @@ def explained(bench: Bench, progress: Progress = no_progress) -> Explained:
         bench: the study, its recordings and the fitted model.
         progress: called with a line of text as each part begins.
     """
-    bench = with_adequate_base(bench, progress)
+    first = _explained_once(with_adequate_base(bench, progress), progress)
+    return _with_rarer(first, progress)
+
+
+def _with_rarer(first: Explained, progress: Progress) -> Explained:
+    """The explanation; by the whole library if no usual effect explains the error.
+
+    Effects are fitted again only if the score of a rarer one, corrected for the number of all, is
+    more than chance. Where a healthy recording checks a model along its measured motion, rarer ones
+    are tried as refinements already, and fits take long.
+    """
+    bench, told = first.bench, first.explanation
+    rarer = suitable(bench.study)[1]
+    if told.verdict != "unknown_effect" or not rarer or not tries_rarer(bench.study):
+        return first
+    wider = with_whole_library(bench.study)
+    rows = rank_all(wider, bench.data, bench.base)
+    if not any(row.effect in rarer and row.p_value < BY_CHANCE for row in rows):
+        return _with_text(first, f"{told.text}; nor is it like one of {len(rarer)} rarer ones")
+    progress(f"no usual effect explains the error: trying {len(rarer)} rarer ones")
+    second = _explained_once(replace(bench, study=wider), progress)
+    found = second.explanation
+    if found.verdict not in STRENGTH_TOLD:
+        return _with_text(first, f"{told.text}; nor does one of {len(rarer)} rarer ones")
+    text = RARER.format(text=found.text, count=len(rarer))
+    unlike = "; ".join([*filter(None, [found.unlike]), SECOND_PASS])
+    doubted = replace(found, text=text, unlike=unlike, wrong_probability=None, wrong_at_most=None)
+    return replace(second, explanation=doubted)
+
+
+def tries_rarer(study: Study) -> bool:
+    """Whether rarer effects are tried by themselves where no usual one explains the error."""
+    checked = predicts_along_motion(study) and bool(study.file.healthy)
+    return not (checked or study.model.rough)
+
+
+def _with_text(found: Explained, text: str) -> Explained:
+    return replace(found, explanation=replace(found.explanation, text=text))
+
+
+def with_whole_library(study: Study) -> Study:
+    """The study with the library's rarer effects among those that are ranked."""
+    return replace(study, file=structs.replace(study.file, whole_library=True))
+
+
+def _explained_once(bench: Bench, progress: Progress) -> Explained:
+    """The explanation by the effects that the study ranks."""
     bench, rows, verdict = _ranked(bench, progress)
     bench = with_lower_floor(bench, rows)
-    if verdict.word in STRENGTH_TOLD and bench.data.along_motion:
+    healthy = bench.data.healthy is not None
+    if verdict.word in STRENGTH_TOLD and bench.data.along_motion and healthy:
         progress("finding what the healthy recording leaves open of the strength")
     found = explanation(bench, rows, verdict)
     if bench.study.file.effects and _asks_for_exchange(bench, verdict):
@@ -155,15 +211,16 @@ def _ranked(bench: Bench, progress: Progress) -> tuple[Bench, list[Ranked], Verd
 
 def _judged(bench: Bench, rows: list[Ranked], progress: Progress) -> tuple[list[Ranked], Verdict]:
     """The verdict on a ranking, with the effect that it names first."""
-    verdict = credible_verdict(bench, rows)
-    rows, verdict = _refined(bench, rows, verdict, progress)
+    refused = refusals(bench.study)
+    verdict = credible_verdict(bench, rows, refused)
+    rows, verdict = _refined(bench, rows, verdict, refused, progress)
     along = bench.data.along_motion
     # Sets of effects are judged by whether only noise is left, which a rough model never reaches.
     if along or bench.study.model.rough:
         verdict = _by_pairs(bench, rows, verdict, progress)
     elif may_need_several(bench, verdict):
         verdict = several_effects(bench, rows, verdict, progress)
-    verdict = unless_refused(bench, with_motion_sensor(bench, verdict))
+    verdict = unless_refused(refused, with_motion_sensor(bench, verdict))
     if along and bench.study.model.rough:
         verdict = limited_verdict(bench.base, rows, bench.floor, verdict)
     elif along:
@@ -189,7 +246,11 @@ def _with_rival_hold(decided: Decided, verdict: Verdict) -> Verdict:
 
 
 def _refined(
-    bench: Bench, rows: list[Ranked], verdict: Verdict, progress: Progress
+    bench: Bench,
+    rows: list[Ranked],
+    verdict: Verdict,
+    refused: Refusals,
+    progress: Progress,
 ) -> tuple[list[Ranked], Verdict]:
     """Ranking and verdict with refinements of the best effect, if it leaves much along the motion.
 
@@ -207,7 +268,7 @@ def _refined(
         return rows, verdict
     # The coarser effect is named in place of a finer one while other physics is missing.
     best.accepted, best.reason = False, f"leaves much that {finer[0].label} explains"
-    return refined, credible_verdict(bench, refined)
+    return refined, credible_verdict(bench, refined, refused)
 
 
 def _explains_the_rest(bench: Bench, row: Ranked) -> bool:

@@ -6,7 +6,7 @@ from rigwatch.workbench.compare import Bases, Comparison, Region
 from rigwatch.workbench.explain import Explanation, Row
 from rigwatch.workbench.fit import Value, error_text, shown
 from rigwatch.workbench.steps import Change
-from rigwatch.workbench.study import GIVEN, Held
+from rigwatch.workbench.study import FILE, GIVEN, Held
 
 VERDICTS = {
     "nothing_missing": "nothing is missing",
@@ -176,6 +176,24 @@ def next_command(found: Explanation, study: str) -> str:
     best = found.ranking[0]
     others = f" --with {' '.join(found.beside)}" if found.beside else ""
     return f"rigwatch add {study} {best.effect} --port {best.port}{others}"
+
+
+def next_step(found: Explanation, study: str) -> str:
+    """What to do after an explanation; empty if nothing is named or the text says it.
+
+    Args:
+        found: the explanation.
+        study: the study's folder, as on the command line.
+    """
+    if found.verdict != "undetermined" or not found.ranking:
+        return next_command(found, study)
+    best = found.ranking[0]
+    what = "record that experiment" if found.next_experiment else "record another motion"
+    add = f"rigwatch add {study} {best.effect} --port {best.port}"
+    return (
+        f"{what}, list it under [[train]] in {study}/{FILE}, and explain again; or, if you know"
+        f" that it is {best.effect}@{best.port}: {add}"
+    )
 
 
 def doubt_of(found: Explanation) -> str:

@@ -16,6 +16,8 @@ from rigwatch.workbench.data import (
     UNFILLED,
     Columns,
     Part,
+    form_along_motion,
+    predicts_along_motion,
     prepare,
     proposed_low_pass,
     proposed_split,
@@ -63,6 +65,8 @@ def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
         study = start_study(folder, text)
         told = prepare(study).remarks
     # A horizon is chosen when the study is fitted: what fills none is not known yet.
+    if predicts_along_motion(study):
+        choices.append(form_along_motion(study.model))
     return study, [*remarks, *choices, *(remark for remark in told if UNFILLED not in remark)]
 
 

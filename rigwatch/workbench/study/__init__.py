@@ -16,7 +16,7 @@ from rigwatch.workbench.study.known_values import assumed_values
 from rigwatch.workbench.study.ledger import append, check_data, commit, lines, model_hash, stands_on
 from rigwatch.workbench.study.moving_parameters import judged_alone
 from rigwatch.workbench.study.recording_parameters import Known
-from rigwatch.workbench.study.refusals import REFUSED, refusal, refusals
+from rigwatch.workbench.study.refusals import REFUSED, Refusals, refusal, refusals
 from rigwatch.workbench.study.study import (
     GIVEN,
     HEALTHY,
@@ -47,6 +47,7 @@ __all__ = [
     "Held",
     "Kept",
     "Known",
+    "Refusals",
     "Span",
     "Study",
     "StudyFile",

@@ -5,7 +5,7 @@ What does not keep its gain there is not named again before the study has change
 """
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import msgspec
@@ -14,6 +14,8 @@ from rigwatch.version import __version__
 from rigwatch.workbench.study.ledger import data_hashes, lines
 from rigwatch.workbench.study.study import Study
 
+Refusals = Mapping[tuple[str, ...], str]
+"""Reasons by the effect, as "effect@port", and the others of its set, sorted."""
 REFUSED = "refused"
 """The ledger's name of such a step."""
 

@@ -1,5 +1,6 @@
 """A new study says how many effects are tried, and an unknown one how the others are."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,16 +15,29 @@ from tests.workbench.studies.test_recordings_apart import DAMPER
 WITH_OIL = DAMPER.replace("c*v -", "thickness*c*v -").replace(
     "outputs.", 'parameters.thickness = { value = 1.0, unit = "1", fixed = true }\noutputs.'
 )
-HINT = "rarer effects have not been tried"
 
 
-def logged(path: Path, seed: int) -> str:
-    """A damper that something else pushes at random, slowly."""
+Law = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+def stop_below(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """A rubber stop on one side."""
+    return 60 * np.minimum(x + 0.011, 0.0)
+
+
+def binding(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Dry friction at one place of the stroke."""
+    return 0.2 * np.tanh(v / 0.002) * np.exp(-(((x - 0.008) / 0.002) ** 2))
+
+
+def logged(path: Path, seed: int, law: Law | None = None) -> str:
+    """A damper with a force by a law, or one that something else pushes at random, slowly."""
     draws = np.random.default_rng(seed).normal(size=(2, 1500))
     t = np.arange(1500) / 100
     x = 0.01 * (np.sin((2 + 0.3 * seed) * t) + np.sin(3.3 * t + 0.05 * t**2 + seed))
     v = np.gradient(x, 0.01)
-    force = 3 * v + scipy.signal.lfilter([0.1], [1, -0.9], draws[0]) + 0.01 * draws[1]
+    hidden = scipy.signal.lfilter([0.1], [1, -0.9], draws[0]) if law is None else law(x, v)
+    force = 3 * v + hidden + (0.01 if law is None else 0.004) * draws[1]
     lines = ["time_s,x [m],v [m/s],force [N]"]
     lines += [",".join(f"{value:.6g}" for value in row) for row in zip(t, x, v, force, strict=True)]
     path.write_text("\n".join(lines) + "\n")
@@ -47,9 +61,27 @@ def test_rarer_effects_are_counted_apart_and_offered_where_none_explains_the_err
     assert main(["explain", f"{folder}"]) == 0
     out = capsys.readouterr().out
     assert "something is missing that no known effect explains" in out
-    assert f"next: {len(rarer)} {HINT}" in out
+    assert f"nor is it like one of {len(rarer)} rarer ones" in out
+    assert "next:" not in out
     file = folder / "study.toml"
     own_value = f"set this machine's under [start] in {file}"
     assert f"note: thickness: taken from the model file; {own_value}" in out
     file.write_text(f"whole_library = true\n{file.read_text()}")
     assert suitable(open_study(folder))[1] == []
+
+
+@pytest.mark.parametrize(("law", "name"), [(stop_below, "stop_below"), (binding, "local_binding")])
+def test_a_rarer_effect_is_named_in_a_second_pass(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], law: Law, name: str
+) -> None:
+    (tmp_path / "damper.toml").write_text(WITH_OIL)
+    logs = [logged(tmp_path / f"run{seed}.csv", seed, law) for seed in (1, 2)]
+    folder, model = tmp_path / "study", tmp_path / "damper.toml"
+    assert main(["study", "new", f"{folder}", "--data", *logs, "--model", f"{model}"]) == 0
+    rarer = len(suitable(open_study(folder))[1])
+    assert main(["explain", f"{folder}"]) == 0
+    out = capsys.readouterr().out
+    assert f"{name}@load is missing" in out
+    assert f"it was found among {rarer} rarer effects, as no usual one explains the error" in out
+    assert "the probability of being wrong is unknown: the effect was found in a second" in out
+    assert f"next: rigwatch add {folder} {name} --port load" in out

@@ -76,16 +76,21 @@ def test_nothing_is_missing_is_not_said_where_outliers_hold_the_error() -> None:
 
 
 def test_recordings_unlike_the_simulated_ones_are_told() -> None:
-    def told(samples: int, *altered: str) -> list[str]:
+    def told(
+        samples: int, *altered: str, along_motion: bool = False, later: bool = False
+    ) -> list[str]:
         held_out = SimpleNamespace(outputs=np.zeros((samples, 1)))
-        data: Any = SimpleNamespace(held_out=held_out, altered=altered)
-        return uncalibrated(cast("Bench", SimpleNamespace(data=data)))
+        data: Any = SimpleNamespace(held_out=held_out, altered=altered, along_motion=along_motion)
+        study = SimpleNamespace(file=SimpleNamespace(effects=("one",) if later else ()))
+        return uncalibrated(cast("Bench", SimpleNamespace(data=data, study=study)))
 
+    missing = "inputs are missing"
     assert told(5120) == []
-    assert told(240, "inputs are missing") == [
-        "inputs are missing",
-        "only 240 held-out samples count",
-    ]
+    assert told(240) == ["only 240 held-out samples count"]
+    # First verdicts on free runs of logs with faults have counts of their own.
+    assert told(5120, missing) == []
+    assert told(5120, missing, along_motion=True) == [missing]
+    assert told(5120, missing, later=True) == [missing]
 
 
 def left(residuals: FloatArray, healthy: FloatArray | None = None) -> Bench:

@@ -7,19 +7,27 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from benchmarks.explaining.machine_studies import machine_study
 from rigwatch.workbench.compare import open_bench
 from rigwatch.workbench.data import prepare
 from rigwatch.workbench.explain.explain import explain, ranking
+from rigwatch.workbench.explain.verdict_calibration import cases_seen_logged, most_probably_wrong
+from rigwatch.workbench.report.text_report import doubt_of
+from rigwatch.workbench.steps import Logs, study_from_logs
 from rigwatch.workbench.study import Study
-from sim_plant.machines import MACHINES
+from sim_plant.machines import MACHINES, log, strength_for
 from sim_plant.machines.loggers import logged
+
+KNOWN = {
+    "cascade": {"A1": 0.0031, "A2": 0.0026},
+    "tanks": {"A1": 0.0028, "A2": 0.0032},
+    "motor": {"R": 2.0, "K": 0.06},
+}
 
 
 def test_a_hidden_level_does_not_run_on_through_inputs_that_were_lost(tmp_path: Path) -> None:
     # 15 lost rows are a minute, as long as the tank's time constant: the level after them is not
     # what an interpolated pump gives, and no effect describes the difference.
-    study = machine_study(tmp_path, "cascade", {"late_pump": 0.3}, 0.02, 1001, "lost")
+    study = made(tmp_path, "cascade", 0.02, 1001, "lost", late_pump=0.3)
     bench = open_bench(study)
     assert bench.data.train.breaks
     verdict = ranking(bench)[1]
@@ -29,12 +37,17 @@ def test_a_hidden_level_does_not_run_on_through_inputs_that_were_lost(tmp_path: 
 
 @pytest.mark.parametrize("machine", ["motor", "tanks"])
 def test_nothing_is_missing_where_only_the_times_are_uneven(tmp_path: Path, machine: str) -> None:
-    found = explain(machine_study(tmp_path, machine, {}, 0.02, 1101, "uneven"))
+    found = explain(made(tmp_path, machine, 0.02, 1101, "uneven"))
     assert found.verdict == "nothing_missing"
+    cases, wrong = cases_seen_logged("nothing_missing")
+    assert (found.like_this, found.unlike) == ((cases, wrong), "")
+    assert found.wrong_at_most == most_probably_wrong(cases, wrong)
+    said = f"of {cases} verdicts on simulated logs with such faults {wrong} was wrong"
+    assert doubt_of(found).endswith(said)
 
 
 def test_half_of_a_window_at_the_end_of_a_recording_counts(tmp_path: Path) -> None:
-    study = machine_study(tmp_path, "motor", {}, 0.005, 1001)
+    study = made(tmp_path, "motor", 0.005, 1001)
     data = prepare(_with_horizon(study, 1.6))
     assert len(data.train) == 8 * 320  # of 2400 samples, which end in the middle of the last
     assert np.isfinite(data.train.outputs).sum() == 2400
@@ -43,7 +56,7 @@ def test_half_of_a_window_at_the_end_of_a_recording_counts(tmp_path: Path) -> No
 
 
 def test_less_than_half_a_window_is_left_out_and_told(tmp_path: Path) -> None:
-    study = machine_study(tmp_path, "motor", {}, 0.005, 1001)
+    study = made(tmp_path, "motor", 0.005, 1001)
     short = prepare(_with_horizon(study, 1.9))
     assert len(short.train) == 6 * 380
     told = (
@@ -64,6 +77,23 @@ def test_a_logger_states_the_times_at_which_it_reads() -> None:
     assert len(logged(machine, {}, 0.0, 3, "lost")["time_s"]) < len(uneven)
     with pytest.raises(ValueError, match="found logger 'clock'"):
         logged(MACHINES["damper"], {}, 0.0, 3, "clock")
+
+
+def made(
+    folder: Path, name: str, noise: float, seed: int, logger: str = "", **share: float
+) -> Study:
+    """The study of two logs of a machine, as its user makes it."""
+    plant = MACHINES[name]
+    hidden = {effect: strength_for(plant, effect, share[effect], seed) for effect in share}
+    paths = []
+    for own in (seed, seed + 1000):
+        table = (
+            logged(plant, hidden, noise, own, logger) if logger else log(plant, hidden, noise, own)
+        )
+        paths.append(folder / f"run{own}.csv")
+        rows = np.column_stack(list(table.values()))
+        np.savetxt(paths[-1], rows, delimiter=",", header=",".join(table), comments="", fmt="%.9g")
+    return study_from_logs(folder / "study", Logs(tuple(paths), name, start=KNOWN[name]))[0]
 
 
 def _with_horizon(study: Study, seconds: float) -> Study:
