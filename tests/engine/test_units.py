@@ -14,7 +14,7 @@ from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.physics.engine.fit.windowed_fit import fit
 from rigwatch.wire.errors import ConfigError, ModelError
 from rigwatch.wire.typed_files.loading import parse
-from rigwatch.wire.units import NONE, UnitError, describe, unit_of
+from rigwatch.wire.units import NONE, UnitError, describe, simplified, unit_of
 from rigwatch.wire.units.unit_table import ENTRIES
 
 MOTOR = """
@@ -121,6 +121,28 @@ def test_every_unit_of_the_table_can_be_read_back_from_its_si_unit() -> None:
     for name, entry in ENTRIES.items():
         assert unit_of(entry.si).dimension == unit_of(name).dimension
         assert unit_of(entry.si).plain
+
+
+@pytest.mark.parametrize(
+    ("text", "plain"),
+    [
+        ("(N m)/((rad/s)*(rad/s))", "N m s^2/rad^2"),
+        ("N/(m*m*m)", "N/m^3"),
+        ("(V)/(V)", "1"),
+        ("1/(mm/s)", "s/mm"),
+        ("l/(min bar^0.5)", "l/(min bar^(1/2))"),
+        ("(m/s)^2/kg/K", "m^2/(s^2 kg K)"),
+        ("degC", "degC"),
+        ("", ""),
+    ],
+)
+def test_brackets_of_a_unit_are_multiplied_out(text: str, plain: str) -> None:
+    assert simplified(text) == plain
+    if text:
+        assert (unit_of(plain).dimension, unit_of(plain).factor) == (
+            unit_of(text).dimension,
+            pytest.approx(unit_of(text).factor),
+        )
 
 
 @pytest.mark.parametrize("value", [0.1, 1 / 3, 1e-300, 7.3e9, -0.0, math.inf, -math.inf])
