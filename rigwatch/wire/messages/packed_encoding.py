@@ -22,8 +22,11 @@ from rigwatch.wire.messages.message_types import (
 )
 from rigwatch.wire.messages.protobuf import encode
 
-_TAGS = {kind: schema.field_tags(kind) for kind in (Column, SampleBlock, EstimateBlock)}
-_NAME, _UNIT, _VALUES, _QUALITY = (bytes([tag]) for tag in _TAGS[Column].values())
+_TAGS = {
+    kind: tuple([bytes([tag]) for tag in schema.field_tags(kind).values()])
+    for kind in (Column, SampleBlock, EstimateBlock)
+}
+_NAME, _UNIT, _VALUES, _QUALITY = _TAGS[Column]
 _FLOAT, _INT, _BYTE = np.dtype("<f8"), np.dtype("<i8"), np.dtype("u1")
 _LARGEST = 1 << 63
 LENGTHS_KEPT = 512
@@ -40,10 +43,9 @@ def encode_block(block: Block) -> bytes:
     times = [block.device_us, block.t_ns] if isinstance(block, SampleBlock) else [block.t_ns]
     if not _is_plain(block, times, columns):
         return encode(block)
-    device, boot, seq, *places = (bytes([tag]) for tag in _TAGS[type(block)].values())
+    _, _, seq, *places = _TAGS[type(block)]
     parts = [
-        _part(device, block.device.encode()),
-        _number(boot, int(block.boot)),
+        _source(samples, block.device, int(block.boot)),
         _number(seq, int(block.seq)),
         *(_part(tag, one.tobytes()) for tag, one in zip(places[: 1 + samples], times, strict=True)),
     ]
@@ -52,6 +54,13 @@ def encode_block(block: Block) -> bytes:
     else:
         parts += [_column(places[-1], column) for column in columns]
     return b"".join(parts)
+
+
+@lru_cache(maxsize=LENGTHS_KEPT)
+def _source(samples: bool, device: str, boot: int) -> bytes:
+    """The bytes that all blocks of a boot begin with."""
+    device_tag, boot_tag, *_ = _TAGS[SampleBlock if samples else EstimateBlock]
+    return _part(device_tag, device.encode()) + _number(boot_tag, boot)
 
 
 def _is_plain(block: Block, times: list[NDArray[np.int64]], columns: Sequence[Column]) -> bool:
