@@ -28,6 +28,7 @@ NEUTRAL = {"coulomb": 0.0, "actuator_gain": 1.0}
 WHY_LATER = "later than the alarm: every known effect is compared with two seconds of samples"
 SIZE = "theta1"
 """The monitor's estimate of dry friction, in units of that which it was commissioned with."""
+_STATEMENTS = re.compile(r"(\w+@\w+) (\(.*?\)): (explains [^;]*)(?:;(.*))?", re.DOTALL)
 ENDED = ("normal", "cleared_unacknowledged")
 NAMELESS = "departure"
 """The alarm that reports a fault without naming it."""
@@ -41,16 +42,19 @@ OF_THE_RIG = (NAMELESS, "dry_friction", "stiction", "other_fault")
 
 @dataclass(frozen=True, slots=True)
 class Act:
-    """A change to the simulated rig: its sample, whether a fault begins with it, a description."""
+    """A change to the simulated rig: its sample, whether a fault begins with it, a description, and
+    how often the scenario has been played before.
+    """
 
     seq: int
     begins: bool
     text: str
+    played: int = 0
 
 
 def acts(scenario: Scenario) -> Iterator[Act]:
     """All changes to the rig, cycle by cycle; endless if the scenario repeats."""
-    rate, cycle = scenario.plant.sample_rate, 0.0
+    rate, cycle, played = scenario.plant.sample_rate, 0.0, 0
     while scenario.events:
         for event in sorted(scenario.events, key=lambda event: event.at_s):
             words = f"{event.effect} becomes {{value:g}}"
@@ -58,10 +62,16 @@ def acts(scenario: Scenario) -> Iterator[Act]:
             faulty = event.value != NEUTRAL.get(event.effect)
             text = begins if faulty else ends
             seq = round((cycle + event.at_s) * rate)
-            yield Act(seq, faulty, text.format(value=event.value))
+            yield Act(seq, faulty, text.format(value=event.value), played)
         if not scenario.cycle_s:
             return
-        cycle += scenario.cycle_s
+        cycle, played = cycle + scenario.cycle_s, played + 1
+
+
+def in_lines(found: str) -> list[str]:
+    """What is probably missing, by statement: effect, physics, how well it explains, rivals."""
+    parts = _STATEMENTS.fullmatch(found)
+    return [part.strip() for part in parts.groups() if part] if parts else [found]
 
 
 class Narrator:
@@ -71,6 +81,7 @@ class Narrator:
         scenario: the changes to the rig.
         say: called with each line.
         rig: the rig's configuration, for the commands that people are told.
+        studies: folder of the studies that the workbench makes of alarms.
         known: the dry friction that the monitor was commissioned with [N].
         attended: people watch, so commands that a running rig answers are told.
 
@@ -84,6 +95,7 @@ class Narrator:
         scenario: Scenario,
         say: Callable[[str], None],
         rig: str,
+        studies: str = "",
         *,
         known: float,
         attended: bool = True,
@@ -91,7 +103,7 @@ class Narrator:
         self.alarms: list[Alarm] = []
         self.explained = False
         self._attended, self._known, self._size = attended, known, 0.0
-        self._say, self._config = say, rig
+        self._say, self._config, self._studies = say, rig, studies
         self._rate, self._cycle_s = scenario.plant.sample_rate, scenario.cycle_s
         self._acts = acts(scenario)
         self._next = next(self._acts, None)
@@ -138,6 +150,10 @@ class Narrator:
         """Say how long after this sample a fault comes; nothing if none does."""
         if self._next is not None and self._next.begins:
             wait = (self._next.seq - seq) / self._rate
+            again = self._last is not None and self._next.played > self._last.played
+            if again:
+                self._say("            that was the last of them, and they begin again:")
+            which = "first" if again else which
             self._say(f"            the {which} fault comes in {wait:.0f} s; Ctrl-C ends the demo")
 
     def judged(self, block: EstimateBlock) -> None:
@@ -183,7 +199,10 @@ class Narrator:
         if event.code == PROBABLY_MISSING:
             self.explained = True
             found = event.text.rpartition("probably missing: ")[2]
-            self._say(f"            probably missing in the rig's model: {found}")
+            first, *more = in_lines(found)
+            self._say(f"            probably missing in the rig's model: {first}")
+            for line in more:
+                self._say(f"              {line}")
             self._say(f"            ({WHY_LATER})")
             newest = self.alarms[-1].name if self.alarms else ""
             # An explanation bears the name of the first alarm, which is mostly a departure.
@@ -192,9 +211,22 @@ class Narrator:
                 known = f"{self._known:g} N of the recording with known friction"
                 self._say(f"            measured friction: {force}, {times} the")
                 self._say(f"            {known}, from which its model was made")
-            effect = re.search(r"(\w+)@\w", found)  # an effect at a port is written effect@port
+            effect = re.search(r"(\w+)@(\w+)", found)  # an effect at a port: effect@port
             if effect:
                 self._say(f"            more about it: $ rigwatch effects {effect[1]}")
+                self._tell_how_to_study(newest or ALARM, effect[1], effect[2])
+
+    def _tell_how_to_study(self, alarm: str, effect: str, port: str) -> None:
+        """Say how the effect's strength is found, and how the model gets it."""
+        if not (self._attended and self._studies):
+            return
+        study = f"{self._studies}/{alarm}-*"
+        self._say(
+            "            next, how strong it is: Open as a study, at the alarm in the workbench;"
+        )
+        self._say("            then explain and add the effect there, or by commands:")
+        self._say(f"              $ rigwatch explain {study}")
+        self._say(f"              $ rigwatch add {study} {effect} --port {port}")
 
     def _tell_end(self) -> None:
         """Report the end of an alarm; that of a departure only if no named fault replaced it."""

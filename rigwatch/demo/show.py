@@ -98,7 +98,12 @@ class Show:
         assert self._config.plant is not None
         scenario = load_scenario(self._config.plant.scenario)
         self._narrator = Narrator(
-            scenario, say, relative(self._rig), known=known_friction(), attended=attended
+            scenario,
+            say,
+            relative(self._rig),
+            relative(folder / "studies"),
+            known=known_friction(),
+            attended=attended,
         )
         self._first = self._seen = 0
         self._up: subprocess.Popen[str] | None = None
