@@ -40,7 +40,8 @@ def refit(
         fitting: `fit_model` accepts the first minimum, `fit_with_retry` also searches elsewhere.
     """
     fits, failures = list[Fitted](), list[str]()
-    for placement, start in product(orders_at_port(study, base, row), _starts(study, base, row)):
+    begun = _starts(study, data, base, row)
+    for placement, start in product(orders_at_port(study, base, row), begun):
         placements = (*base.placements, placement)
         try:
             fits.append(fitting(study, data, placements, start, base.train.scale, base=base))
@@ -53,14 +54,14 @@ def refit(
     judge_fit(base, row)
 
 
-def _starts(study: Study, base: Fitted, row: Ranked) -> list[dict[str, float]]:
+def _starts(study: Study, data: Data, base: Fitted, row: Ranked) -> list[dict[str, float]]:
     """Initial values of a row's fits: where the base model ended, and from given values.
 
-    A parameter that the base model leaves open may have run off, as a heat capacity to infinity,
-    from where a fit with the effect that is missing does not come back.
+    A parameter that a free run leaves open may have run off, as a heat capacity to infinity, from
+    where a fit with the effect that is missing does not come back.
     """
     ended = base.train.values() | row.begin()
-    if base.convergence is None:
+    if base.convergence is None or data.along_motion:
         return [ended]
     own, given = study.model.parameters, study.file.start
     again = {n: given.get(n, own[n].value) for n in base.convergence.undetermined if n in own}

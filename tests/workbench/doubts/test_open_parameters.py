@@ -50,6 +50,9 @@ def test_fits_begin_where_the_base_ended_and_where_open_parameters_were_given(
     )
     placed = Placement("radiation", library()["radiation"], "loss")
     row = Ranked(placed, "force", 0.0, 0.5, {"e": 2e-9}, [], {}, {})
-    starts = _starts(study, base, row)
+    free: Any = SimpleNamespace(along_motion=False)
+    starts = _starts(study, free, base, row)
     assert [start["Cb"] for start in starts] == begun
     assert all(start["C"] == 550.0 and start["loss_radiation_e"] == 2e-9 for start in starts)
+    along: Any = SimpleNamespace(along_motion=True)
+    assert _starts(study, along, base, row) == starts[:1]
