@@ -69,8 +69,7 @@ def measured(paths: list[Path], cycles: int) -> tuple[float, float]:
             line.put(data)
         # In real time: the clocks of device and host are compared.
         time.sleep(max(0.0, began + number * BLOCK / RATE - time.monotonic()))
-        took = _processor_time(lambda: [chain.step(0.0) for chain in chains])
-        spent[0].append(took)
+        spent[0].append(_processor_time(lambda: _step(chains)))
         spent[1].append(_processor_time(lambda: one_turn(seats, contextlib.nullcontext)))
     assert all(seat.delivered >= cycles * BLOCK for seat in seats), "samples did not arrive"
     for seat in seats:
@@ -107,6 +106,11 @@ def _chain(path: Path, line: Line, network: MemoryNetwork) -> Chain:
     chain = Chain(config, adapter, network.bus(config.rig.id, "daq"), Heartbeat("daq"))
     chain.device.start()
     return chain
+
+
+def _step(chains: list[Chain]) -> None:
+    for chain in chains:
+        chain.step(0.0)
 
 
 def _all_run(seats: list[Seat]) -> bool:
