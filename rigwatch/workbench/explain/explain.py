@@ -105,7 +105,8 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
     """
     bench, told = first.bench, first.explanation
     rarer = suitable(bench.study)[1]
-    if told.verdict != "unknown_effect" or not rarer or not tries_rarer(bench.study):
+    explained = told.verdict != "unknown_effect" or told.exchange is not None
+    if explained or not rarer or not tries_rarer(bench.study):
         return first
     wider = with_whole_library(bench.study)
     rows = rank_all(wider, bench.data, bench.base)
