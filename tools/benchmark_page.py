@@ -67,6 +67,7 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
             "held_inputs",
             "hidden_rivals",
             "chains",
+            "user_logs",
             "own_machines",
             "hidden_effects_rig",
             "rig_intervals",

@@ -97,4 +97,5 @@ def made(
 
 
 def _with_horizon(study: Study, seconds: float) -> Study:
-    return replace(study, file=structs.replace(study.file, horizon=seconds))
+    file = structs.replace(study.file, horizon=seconds)
+    return replace(study, file=file, horizon_from="the test")

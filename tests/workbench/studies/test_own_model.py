@@ -127,6 +127,6 @@ def test_every_shipped_model_passes() -> None:
 
 
 def test_what_fills_no_horizon_is_reported(tmp_path: Path) -> None:
-    found = compare(motor(tmp_path, SPEED + PORT, "horizon = 0.9"))
-    said = "train: the last 0.3 s of a recording are not counted, since they fill no horizon of 0.9"
+    found = compare(motor(tmp_path, SPEED + PORT, "horizon = 0.7"))
+    said = "train: the last 0.3 s of a recording are not counted, since they fill no horizon of 0.7"
     assert any(said in remark for remark in found.remarks)
