@@ -15,6 +15,7 @@ from rigwatch.workbench.data.noise import (
     quiet_scale,
 )
 from rigwatch.workbench.data.one_rate import ALIKE as RATES_ALIKE
+from rigwatch.workbench.data.one_rate import RESAMPLED
 from rigwatch.workbench.data.prediction import form_along_motion, predicts_along_motion
 from rigwatch.workbench.data.proposals import (
     Part,
@@ -30,6 +31,7 @@ from rigwatch.workbench.data.signals import UNFILLED, Data, MotionSensor, parame
 __all__ = [
     "METHODS",
     "RATES_ALIKE",
+    "RESAMPLED",
     "UNFILLED",
     "Columns",
     "Data",

@@ -6,18 +6,27 @@ there, to first order, is the part that model error can account for.
 
 What `add` refused in the study's present state is not named as missing: there the study was fitted
 anew with the effect, and lost what a single fit had gained.
+
+Nor is an effect that leaves most of the training of logs that are resampled where an input is held:
+it changes between two new samples, and a controller that saturates does not feel its mean.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 from rigwatch.workbench.compare import Bench, apparent_strength
+from rigwatch.workbench.data import RESAMPLED
+from rigwatch.workbench.explain.remaining_error import LITTLE
 from rigwatch.workbench.explain.verdict import Verdict, judge
 from rigwatch.workbench.ranking import Ranked
 from rigwatch.workbench.study import Refusals
 
 STRONGER = 3.0
 """Smallest ratio of an effect's strength to its apparent strength on the healthy recording."""
+RESAMPLED_HELD = (
+    "so little may be what resampling makes of a held input, which then changes between samples:"
+    " log all recordings at one rate"
+)
 
 
 def credible_verdict(bench: Bench, rows: list[Ranked], refused: Refusals) -> Verdict:
@@ -48,6 +57,19 @@ def unless_refused(refused: Refusals, verdict: Verdict) -> Verdict:
         return verdict
     text = f"{verdict.text}; but `add` found: {reason}"
     return replace(verdict, word="unknown_effect", text=text)
+
+
+def unless_resampled(bench: Bench, verdict: Verdict) -> Verdict:
+    """The verdict; `undetermined` if what it names may be made by resampling a held input."""
+    best, model = verdict.best, bench.study.model
+    named_alone = verdict.word == "missing_effect" and not verdict.beside
+    held = any(model.held(name) == "zero" for name in model.inputs)
+    if best is None or best.fitted is None or not (named_alone and held):
+        return verdict
+    left = bench.floor.left_over(bench.base.train, best.fitted.train)
+    if RESAMPLED not in bench.data.altered or left <= 1 - LITTLE:
+        return verdict
+    return replace(verdict, word="undetermined", text=f"{verdict.text}; {RESAMPLED_HELD}")
 
 
 def still_holds(word: str, label: str, beside: Sequence[str], refused: Refusals) -> bool:

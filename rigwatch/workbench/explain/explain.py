@@ -20,7 +20,11 @@ from rigwatch.workbench.explain.adequacy import (
     with_change_told,
 )
 from rigwatch.workbench.explain.changed_parameters import undetermined_if_parameters_changed
-from rigwatch.workbench.explain.credibility import credible_verdict, unless_refused
+from rigwatch.workbench.explain.credibility import (
+    credible_verdict,
+    unless_refused,
+    unless_resampled,
+)
 from rigwatch.workbench.explain.exchange import Exchange, exchange
 from rigwatch.workbench.explain.excitation import cannot_tell, unexcited, with_unjudged_told
 from rigwatch.workbench.explain.explanation import STRENGTH_TOLD, Explanation, explanation
@@ -228,6 +232,7 @@ def _judged(bench: Bench, rows: list[Ranked], progress: Progress) -> tuple[list[
     elif may_need_several(bench, verdict):
         verdict = several_effects(bench, rows, verdict, progress)
     verdict = unless_refused(refused, with_motion_sensor(bench, verdict))
+    verdict = unless_resampled(bench, verdict)
     if along and bench.study.model.rough:
         verdict = limited_verdict(bench.base, rows, bench.floor, verdict)
     elif along:

@@ -10,7 +10,8 @@ import pytest
 from rigwatch.physics.engine.equations import Placement
 from rigwatch.physics.engine.fit import Fit
 from rigwatch.physics.engine.search import Convergence
-from rigwatch.workbench.data import NoiseFloor
+from rigwatch.workbench.data import RESAMPLED, NoiseFloor
+from rigwatch.workbench.explain.credibility import unless_resampled
 from rigwatch.workbench.explain.indistinguishable import undistinguished
 from rigwatch.workbench.explain.remaining_error import remaining_share
 from rigwatch.workbench.explain.sets.combination import Combination
@@ -834,6 +835,30 @@ def test_of_a_class_the_effect_that_the_sentence_names_is_the_one_to_add() -> No
     assert _named_alone(_Member(smoothing, named), alone) is lag
     del alone[lag.label]
     assert _named_alone(_Member(smoothing, named), alone) is smoothing
+
+
+@pytest.mark.parametrize(
+    ("left", "altered", "hold", "word"),
+    [
+        pytest.param(2.7, (RESAMPLED,), "zero", "undetermined", id="most is left"),
+        pytest.param(2.0, (RESAMPLED,), "zero", "missing_effect", id="less is left"),
+        pytest.param(2.7, (), "zero", "missing_effect", id="at its own rate"),
+        pytest.param(2.7, (RESAMPLED,), "linear", "missing_effect", id="no held input"),
+    ],
+)
+def test_resampling_a_held_input_may_look_like_a_small_effect(
+    left: float, altered: tuple[str, ...], hold: str, word: str
+) -> None:
+    named = best("supply_sag@drive")
+    _with_training_error(named, left)
+    model = SimpleNamespace(inputs=("goal",), held=lambda _: hold)
+    bench: Any = SimpleNamespace(
+        study=SimpleNamespace(model=model), data=SimpleNamespace(altered=altered),
+        base=base(3.0), floor=QUIET,
+    )  # fmt: skip
+    found = unless_resampled(bench, Verdict("missing_effect", named, (), (), "it is missing"))
+    assert found.word == word
+    assert ("log all recordings at one rate" in found.text) == (word == "undetermined")
 
 
 # ---- the model's own error --------------------------------------------------------------------
