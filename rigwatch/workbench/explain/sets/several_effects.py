@@ -31,6 +31,7 @@ from rigwatch.workbench.explain.sets.combinations import (
 )
 from rigwatch.workbench.explain.verdict import Verdict, judge
 from rigwatch.workbench.explain.verdict_calibration import Evidence
+from rigwatch.workbench.fit import Fitted
 from rigwatch.workbench.ranking import (
     EXPLAINED,
     MUCH_WORSE,
@@ -49,11 +50,12 @@ ROUNDS = 4
 
 @dataclass(frozen=True, eq=False)
 class _Member:
-    """One effect of a set, judged with the rest of the set in the model."""
+    """One effect of a set, judged with the rest of the set in the model, which leaves `without`."""
 
     row: Ranked
     verdict: Verdict
     ranked: Sequence[Ranked] = ()
+    without: Fitted | None = None
 
     @property
     def named(self) -> frozenset[str]:
@@ -234,7 +236,7 @@ def _judge_each(
             better = Combination((*rest.rows, other))
             if better.fitted.held_out_error < best.fitted.held_out_error:
                 return better, []
-        parts.append(_Member(row, found, ranking))
+        parts.append(_Member(row, found, ranking, rest.fitted))
     return None, parts
 
 
@@ -288,7 +290,7 @@ def _set_verdict(
     return replace(
         found,
         best=row,
-        text=f"with {_joined(others)}: {found.text}{_how_to_add(row, others)}",
+        text=f"with {_rest(bench, others, first)}: {found.text}{_how_to_add(row, others)}",
         second=second,
         evidence=Evidence(left, found.evidence.margin),
         beside=others,
@@ -299,6 +301,14 @@ def _named_alone(part: _Member, alone: Mapping[str, Ranked]) -> Ranked:
     """The row without the set of what a verdict names, which may be another of the class."""
     named = part.verdict.best
     return alone[named.label if named is not None and named.label in alone else part.row.label]
+
+
+def _rest(bench: Bench, others: Sequence[str], part: _Member) -> str:
+    """The rest of a set, and from where to where it alone brings the held-out error."""
+    if part.without is None:
+        return _joined(others)
+    before, alone = bench.base.told_error, part.without.told_error
+    return f"{_joined(others)} ({before:.3g} → {alone:.3g} {bench.base.told_in})"
 
 
 def _how_to_add(row: Ranked, others: Sequence[str]) -> str:
