@@ -83,10 +83,13 @@ class Conditioner:
             self._boot = raw.boot
             self._state = np.zeros(len(self._channels), _STATE)
             self._state["since_move"] = np.iinfo(np.int64).max // 2
-        values, flags = self._judged(raw)
+        # A copy for all channels, as one for each costs more.
+        values, flags = (one.T.copy() for one in self._judged(raw))
         columns = tuple(
-            Column(channel.name, channel.unit, values[:, i].copy(), flags[:, i].copy())
-            for i, channel in enumerate(self._channels)
+            [
+                Column(channel.name, channel.unit, *of)
+                for channel, *of in zip(self._channels, values, flags, strict=True)
+            ]
         )
         return SampleBlock(self._device, raw.boot, int(raw.seq[0]), raw.device_us, t_ns, columns)
 

@@ -77,6 +77,9 @@ class SequenceTracker:
 
     def accept(self, raw: RawBlock) -> list[Step]:
         """The steps in `raw`, in order: runs, with gaps and restarts between them."""
+        next_ones = self._next_ones(raw)
+        if next_ones is not None:
+            return [next_ones]
         steps: list[Step] = []
         run = _Run(self._boot)
         rows = zip(raw.seq.tolist(), raw.device_us.tolist(), raw.arrived_ns.tolist(), strict=True)
@@ -90,6 +93,31 @@ class SequenceTracker:
                 run = _Run(self._boot)
             run.add(index, self._seq, self._us)
         return steps + run.of(raw)
+
+    def _next_ones(self, raw: RawBlock) -> RawBlock | None:
+        """The whole block, unwrapped, if each sample is the next one of the same boot.
+
+        What `_place` would do with each of them, in a third of its time.
+        """
+        numbers = raw.seq.tolist()
+        if raw.boot != self._device_boot or not numbers:
+            return None
+        ahead = _signed(numbers[0] - self._seq)
+        if ahead != 1 or numbers != [*range(numbers[0], numbers[0] + len(numbers))]:
+            return None
+        unwrapped, us, before = [], self._us, self._arrived
+        for told, arrived in zip(raw.device_us.tolist(), raw.arrived_ns.tolist(), strict=True):
+            elapsed_us = (arrived - before) // 1000
+            us += elapsed_us + _signed(told - us - elapsed_us)
+            before = arrived
+            unwrapped.append(us)
+        first = self._seq + 1
+        self._seq, self._us, self._arrived = self._seq + len(numbers), us, before
+        self._repeats = 0
+        seq, device_us = np.arange(first, self._seq + 1), np.array(unwrapped, np.int64)
+        return RawBlock(
+            self._boot, seq, device_us, raw.codes, raw.arrived_ns, raw.calibrated, raw.quality
+        )
 
     def _place(self, boot: int, seq: int, us: int, arrived: int) -> list[Step]:
         """Add one sample; what is reported before it, or `_REPEATED`."""

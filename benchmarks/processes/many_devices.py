@@ -35,14 +35,15 @@ def serve(times: Path, links: list[Path]) -> None:
     for line in lines:
         line.plug()
     began = time.monotonic()
-    for number, frame in enumerate(_encoded()):
+    for number, frame in enumerate(encoded()):
         time.sleep(max(0.0, began + number / RATE - time.monotonic()))
         sent[number] = time.monotonic()
         for line in lines:
             line.write(frame)
 
 
-def _encoded() -> Iterator[bytes]:
+def encoded() -> Iterator[bytes]:
+    """The frames of a run, one after the other."""
     device = Device(ScenarioRun(load_scenario(SCENARIO), 1))
     for _ in range(LONGEST):
         yield from map(encode, frames(device.advance(RATE)))

@@ -4,13 +4,14 @@ The core is pure (`AlarmManager`); only `journal.py` touches a file. One table, 
 every alarm with its severity, cause, guidance and default settings.
 """
 
-from monitor.alarms.journal import AlarmJournal, journal_text, read_journal
+from monitor.alarms.journal import AlarmJournal, journal_text, read_end, read_journal
 from monitor.alarms.kinds import ALARM_KINDS, AlarmKind, check_settings, settings_of
 from monitor.alarms.manager import AlarmManager, Announcement
 from monitor.alarms.operator import bounded
 from monitor.alarms.quality import SensorFlags
 from monitor.alarms.record import AlarmRecord, just_returned
 from monitor.alarms.state import Occasion
+from monitor.alarms.unsaid import unsaid
 
 __all__ = [
     "ALARM_KINDS",
@@ -25,6 +26,8 @@ __all__ = [
     "check_settings",
     "journal_text",
     "just_returned",
+    "read_end",
     "read_journal",
     "settings_of",
+    "unsaid",
 ]

@@ -27,6 +27,8 @@ LARGEST, KEPT = 16 << 20, 8
 """Size at which a journal is rotated [bytes], and number of older files kept."""
 LONGEST_LINE = 1 << 16
 """Longest line read, far above any line written [bytes]."""
+END = 1 << 16
+"""Length of a journal's end [bytes]: a hundred records."""
 
 
 class AlarmJournal:
@@ -198,6 +200,17 @@ def read_journal(path: Path | str) -> tuple[list[AlarmRecord], int]:
         raise SessionError(f"{path}: alarm journal cannot be read: {reason_of(error)}") from error
     records = [record for record in parsed if record is not None]
     return records, len(parsed) - len(records)
+
+
+def read_end(path: Path | str) -> list[AlarmRecord]:
+    """The last records of a journal, in order; none if it cannot be read."""
+    try:
+        with Path(path).open("rb") as file:
+            file.seek(max(0, os.fstat(file.fileno()).st_size - END))
+            parsed = [_parse(line) for line in _lines(file)]
+    except OSError:
+        return []
+    return [record for record in parsed if record is not None]
 
 
 def journal_text(records: Iterable[AlarmRecord]) -> bytes:

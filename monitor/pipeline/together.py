@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -39,12 +39,18 @@ class Ready:
 def ready_of(rig: RigMonitor, block: SampleBlock) -> Ready | None:
     """The block, if it follows the last one (`RigMonitor.follows`) and has the model's channels."""
     state = rig.steady() if rig.follows(block) else None
-    names = [channel.name for channel in block.channels]
-    if state is None or not set(names).issuperset(rig.model.channels):
+    names = tuple([channel.name for channel in block.channels])
+    rows = _rows(names, rig.model.channels)
+    if state is None or rows is None:
         return None
-    rows = [names.index(name) for name in rig.model.channels]
     alike = state.kind, len(block), tuple([len(channel.quality) for channel in block.channels])
     return Ready(rig, block, state, rows, alike)
+
+
+@lru_cache(maxsize=64)
+def _rows(names: tuple[str, ...], wanted: tuple[str, ...]) -> list[int] | None:
+    """The places of the wanted names among these; None if one is not there."""
+    return [names.index(name) for name in wanted] if set(names).issuperset(wanted) else None
 
 
 def judge_together(blocks: Sequence[Ready]) -> list[Finish | None]:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
-from monitor.alarms import AlarmJournal, Announcement, just_returned
+from monitor.alarms import AlarmJournal, Announcement, just_returned, read_end, unsaid
 from monitor.detectors import FRICTION, detectors_of
 from monitor.diagnosis import Explainer
 from monitor.model import RigModel, load_model
@@ -32,7 +32,14 @@ from monitor.process.presence import Presence
 from monitor.process.rig_time import RigTime
 from monitor.process.startup_grace import Patience
 from monitor.signals import MONITOR_RESET
-from rigwatch.wire.bus import Bus, CommandCheck, joined, serve_alarm_list, serve_shelf
+from rigwatch.wire.bus import (
+    Bus,
+    CommandCheck,
+    KeptMessages,
+    joined,
+    serve_alarm_list,
+    serve_shelf,
+)
 from rigwatch.wire.delivery import POSITION_WRONG, Item, SampleReader
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.host import (
@@ -58,6 +65,7 @@ from rigwatch.wire.messages import (
     Health,
     SampleBlock,
     cut,
+    encode,
     pieces,
 )
 from rigwatch.wire.rig_config import MonitorSection, RigConfig, load_rig, section_or_error
@@ -88,7 +96,7 @@ class MonitorProcess:
         friction = FRICTION in section.detectors
         self.rig = RigMonitor(model, section.alarms, detectors, str(path), friction)
         self.bus = bus
-        self._alone, self._journal, self._cursor = _opened(section.journal)
+        self._alone, self._journal, self._cursor, self._said = _opened(section.journal)
         self._done = self._cursor.read() if self._cursor else None
         self._stale_after = config.stale_after
         self._time = RigTime(*both_clocks())
@@ -107,7 +115,7 @@ class MonitorProcess:
         self._standing = self.rig.alarms.standing()
         check = CommandCheck(bus, config.bus.security)
         self._operators = OperatorDesk(bus, check)
-        bus.announce()
+        bus.announce(self._said)
         self._of_daq = bus.subscribe_own(HEALTH, "daq")
         self._of_recorder = bus.subscribe_own(HEALTH, "recorder")
         self._follow("daq", self._daq_presence)
@@ -233,7 +241,7 @@ class MonitorProcess:
         self.reader.close()
         self._explainer.close()
         self._models.close()
-        for kept in (self._journal, self._cursor):
+        for kept in (self._journal, self._cursor, self._said):
             if kept:
                 kept.close()
         if self._alone:
@@ -345,6 +353,8 @@ class MonitorProcess:
         if self._alone and self._cursor:
             self._alone.check()
             self._cursor.keep()
+        if self._said:
+            self._said.write()  # what could not be written before
         stale = seen.silent_s > max(1.0, self._stale_after)
         state = "unsuitable" if self._unsuitable else "stale" if stale else "running"
         text = self._unsuitable or ("no samples arrive" if stale else "")
@@ -363,10 +373,15 @@ class MonitorProcess:
         )
 
 
-def _opened(journal: str) -> tuple[Kept | None, AlarmJournal | None, Cursor | None]:
-    """Lock, journal and position at a path, all or none: a rig that cannot start keeps no file."""
+def _opened(
+    journal: str,
+) -> tuple[Kept | None, AlarmJournal | None, Cursor | None, KeptMessages | None]:
+    """Lock, journal, position and sent alarms at a path.
+
+    All or none: a rig that cannot start keeps no file.
+    """
     if not journal:
-        return None, None, None
+        return None, None, None, None
     with ExitStack() as opened:
         alone = Kept(Path(f"{journal}.lock"), f"{journal}: alarm journal")
         opened.callback(alone.give_up)
@@ -374,7 +389,15 @@ def _opened(journal: str) -> tuple[Kept | None, AlarmJournal | None, Cursor | No
         opened.callback(kept.close)
         cursor = Cursor(f"{journal}.position")
         opened.pop_all()
-        return alone, kept, cursor
+        return alone, kept, cursor, _said(journal)
+
+
+def _said(journal: str) -> KeptMessages:
+    """The alarms that the earlier runs have sent, or were about to send."""
+    said = KeptMessages(f"{journal}.said")
+    left = unsaid(read_end(journal), said.payloads)
+    said.complete(None if left is None else [encode(alarm) for alarm in left])
+    return said
 
 
 def monitor_section(config: RigConfig, path: Path | str) -> MonitorSection:

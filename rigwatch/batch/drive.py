@@ -20,7 +20,10 @@ from rigwatch.wire.errors import BatchError, one_line
 
 TASK_S = 1.5
 """Intended length of a task: far longer than it takes to hand it over [s]."""
-LARGEST_TASK = 256
+SHORTEST_TASK_S = 0.05
+"""Tasks at the end are not shorter: handing one over takes a scheduler, its worker and the client
+together some 13 ms of processor time, and waiting for the last one costs no more than this [s]."""
+LARGEST_TASK = 512
 RETRIES = 3
 _LOOK_AGAIN_S = 5.0
 Run = Callable[[Sequence[str], str], list[Outcome]]
@@ -90,9 +93,13 @@ class Drive:
         """Units of the next task; towards the end tasks get shorter, so that all workers work."""
         if self._again:
             return (self._again.popleft(),)
-        fitting = int(TASK_S / self._seconds) if self._seconds else 1
-        size = max(1, min(fitting, LARGEST_TASK, len(self._waiting) // window))
+        share = max(len(self._waiting) // window, self._in(SHORTEST_TASK_S))
+        size = min(share, self._in(TASK_S), LARGEST_TASK, len(self._waiting))
         return tuple(self._waiting.popleft() for _ in range(size))
+
+    def _in(self, seconds: float) -> int:
+        """Number of units that take so long, at least one; one while no time is known."""
+        return max(1, int(seconds / self._seconds)) if self._seconds else 1
 
     def _submit(self, units: tuple[str, ...], *, alone: bool) -> None:
         future = self._pool.submit(self._run, units, next(self._labels))

@@ -2,31 +2,43 @@
 
 import glob
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from operator import attrgetter
 from pathlib import Path
 
 from rigwatch.wire.errors import BatchError
-from rigwatch.wire.session import SUFFIX, is_segment
+from rigwatch.wire.session import SUFFIX, names_segment
 
 Finder = Callable[[Path], list[Path]]
 
 
 def recording_at(folder: Path) -> list[Path]:
     """The recordings in a folder, at any depth: session files, and folders of segments."""
-    if is_segmented(folder):
+    top = _listed(str(folder))
+    if any(names_segment(entry.name) for entry in top):
         return [folder]
-    found: dict[Path, None] = {}
-    # Ten thousand paths are in order in half the time by their parts, which is the same order.
-    for file in sorted(folder.rglob(f"*{SUFFIX}"), key=attrgetter("parts")):
-        whole = file.parent if is_segment(file) else file
-        found[whole] = None
-    return list(found)
+    return [Path(name) for name in dict.fromkeys(_recordings(str(folder), top))]
 
 
-def is_segmented(folder: Path) -> bool:
-    """Whether a folder is one session, written by a recorder in segments."""
-    return any(is_segment(file) for file in folder.glob(f"*{SUFFIX}"))
+def _listed(folder: str) -> "list[os.DirEntry[str]]":
+    """What a folder holds, in the order of names; nothing if it may not be read.
+
+    Workers wait for the listing, and `Path.rglob` takes five times as long for ten thousand files.
+    """
+    try:
+        with os.scandir(folder) as found:
+            return sorted(found, key=attrgetter("name"))
+    except PermissionError:
+        return []
+
+
+def _recordings(folder: str, held: "list[os.DirEntry[str]]") -> Iterator[str]:
+    """The recording that each session file belongs to; links to folders are not followed."""
+    for entry in held:
+        if entry.name.endswith(SUFFIX):
+            yield folder if names_segment(entry.name) else entry.path
+        if entry.is_dir(follow_symlinks=False):
+            yield from _recordings(entry.path, _listed(entry.path))
 
 
 def is_address(text: str) -> bool:
@@ -52,19 +64,19 @@ def expand(given: Iterable[Path | str], inside: Finder = recording_at) -> list[s
             found[text] = text
             continue
         for path in _paths(text):
-            for unit in inside(path) if path.is_dir() else [path]:
-                found.setdefault(_resolved(unit, resolved), str(unit))
+            for unit in map(str, inside(path) if path.is_dir() else [path]):
+                found.setdefault(_resolved(unit, resolved), unit)
     if not found:
         names = ", ".join(map(str, given)) or "no path"
         raise BatchError(f"{names}: found nothing to work on, expected recordings or studies")
     return sorted(found.values())
 
 
-def _resolved(unit: Path, folders: dict[str, str]) -> str:
+def _resolved(unit: str, folders: dict[str, str]) -> str:
     """The unit's path without links; folders are resolved once, and kept in `folders`."""
-    if unit.is_symlink() or unit.name in ("", ".."):
-        return str(unit.resolve())
     folder, name = os.path.split(unit)
+    if name in ("", "..") or os.path.islink(unit):  # noqa: PTH114
+        return os.path.realpath(unit)
     if folder not in folders:
         folders[folder] = os.path.realpath(folder).rstrip("/")
     return f"{folders[folder]}/{name}"

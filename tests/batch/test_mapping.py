@@ -13,7 +13,9 @@ import polars
 import pytest
 
 import rigwatch
-from rigwatch.batch import executor_on
+from rigwatch.batch import Outcome, executor_on
+from rigwatch.batch.drive import LARGEST_TASK, RETRIES, SHORTEST_TASK_S, Drive
+from rigwatch.batch.pool import Pool
 from rigwatch.wire.errors import BatchError
 from tests.batch.jobs import ROOT, counted, make_files, sizes
 from tests.waiting import eventually
@@ -188,3 +190,20 @@ def test_what_answers_and_is_no_scheduler_is_not_awaited_for_ever(monkeypatch):
         with pytest.raises(BatchError, match=f"{where}: .*no scheduler"), executor_on(where):
             pass
         web.shutdown()
+
+
+def test_short_units_go_in_long_tasks_and_at_the_end_in_shorter_ones_that_are_worth_it():
+    lengths, each_s = [], 0.002
+
+    def run(paths, _label):
+        lengths.append(len(paths))
+        return [Outcome(path, "", b"1", seconds=each_s) for path in paths]
+
+    units = [f"{number:05d}" for number in range(5000)]
+    found = Drive(Pool(None), run, units, RETRIES, lambda _: None)
+    assert [outcome.path for outcome in found] == units
+    timed = lengths[2:]  # two begin before the time of a unit is known
+    assert timed == sorted(timed, reverse=True)
+    assert timed[0] == LARGEST_TASK
+    assert all(size * each_s >= SHORTEST_TASK_S for size in timed[:-1])
+    assert timed[-2] * each_s < 2 * SHORTEST_TASK_S

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigwatch.wire.bus import Bus, sender
-from rigwatch.wire.bus.alarm_shares import STRANGERS_SHARE
+from rigwatch.wire.bus.alarms.shares import STRANGERS_SHARE
 from rigwatch.wire.bus.complete_subscription import MOST_SENDERS
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.bus.message_ring import REPLY_BYTES, MessageRing

@@ -1,11 +1,16 @@
 """What a reader says of samples it could not deliver, whom it follows, and how often it asks."""
 
-import pytest
+from typing import Any
 
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from rigwatch.wire.messages import SampleBlock
 from rigwatch.wire.ordering import OPEN, UNKNOWN, Ask, Numbered, RingReply
 from rigwatch.wire.ordering.outcomes import FORGED, POSITION_WRONG, Loss, Remark
 from rigwatch.wire.ordering.sample_order import LARGEST_SEQ, SUSPECT, TRIES, SampleOrder
-from tests.bus.samples import block
+from tests.bus.samples import block, is_intact
 from tests.bus.test_sample_order import Bench
 
 LATER = 10**12
@@ -491,3 +496,61 @@ def test_a_fresh_sample_ends_the_suspicion() -> None:
     assert not bench.asks
     hear_old(bench, 1)
     assert len(bench.asks) == 1
+
+
+# ---- the short way -------------------------------------------------------------------------
+
+
+class StepByStep(SampleOrder[SampleBlock]):
+    """Takes no short way for a block that simply follows the last one."""
+
+    def _goes_on(self, block: SampleBlock) -> bool:
+        return False
+
+
+BOOTS = st.sampled_from([7, 7, 8])
+EVENTS = st.one_of(
+    st.tuples(st.just("block"), BOOTS, st.sampled_from([0, 0, -4, -2, 3]), st.integers(0, 3)),
+    st.tuples(st.just("block"), BOOTS, st.just(0), st.just(1)),
+    st.tuples(st.just("token"), BOOTS, st.booleans()),
+    st.tuples(st.just("reply"), st.integers(-1, 3)),
+    st.tuples(st.just("silence")),
+)
+
+
+@example([("block", 7, 0, 1), ("block", 7, 3, 1), ("block", 7, -4, 3)], False)
+@settings(max_examples=300)
+@given(st.lists(EVENTS, min_size=10, max_size=60), st.booleans())
+def test_a_block_that_simply_follows_is_treated_as_by_all_steps(
+    events: list[tuple[Any, ...]], patient: bool
+) -> None:
+    orders: list[SampleOrder[SampleBlock]] = [
+        one(capacity=8, patient=patient) for one in (SampleOrder, StepByStep)
+    ]
+    nexts, asked = {7: 0, 8: 0}, [Ask(7, 0, OPEN)]
+    for kind, *rest in events:
+        if kind == "block":
+            boot, ahead, count = rest
+            sent = block(max(0, nexts[boot] + ahead), count, boot)
+            nexts[boot] = max(nexts[boot], sent.seq + count)
+            found = [order.on_block(sent) for order in orders]
+        elif kind == "token":
+            found = [order.on_token(rest[0], rest[0], rest[1]) for order in orders]
+        elif kind == "reply":
+            ask = asked[-1]
+            kept = block(ask.first, rest[0], ask.boot) if rest[0] > 0 else None
+            reply = RingReply(ask.boot, ask.first + rest[0] - 1, (kept,)) if kept else None
+            found = [order.on_reply(ask, reply) for order in orders]
+        else:
+            found = [order.on_silence() for order in orders]
+        quick, careful = ([_plain(one) for one in some] for some in found)
+        assert quick == careful
+        assert orders[0].counters == orders[1].counters
+        assert orders[0].position == orders[1].position
+        asked += [one for one in found[0] if isinstance(one, Ask)]
+
+
+def _plain(outcome: Any) -> Any:
+    if not isinstance(outcome, SampleBlock):
+        return outcome
+    return outcome.boot, outcome.seq, len(outcome), is_intact(outcome)

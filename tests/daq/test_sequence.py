@@ -53,6 +53,46 @@ def test_any_losses_and_repetitions(first: int, fates: list[str], cuts: list[int
     assert tracker.lost == len(lost)
 
 
+class SampleBySample(SequenceTracker):
+    """Takes no short way for blocks of samples that simply follow."""
+
+    def _next_ones(self, raw: RawBlock) -> RawBlock | None:
+        return None
+
+
+@given(
+    st.integers(0, 2**33),
+    st.integers(-(2**32), 2**32),
+    st.lists(
+        st.tuples(
+            st.integers(1, 9),
+            st.sampled_from([0, 0, 0, -3, -1, 2]),
+            st.integers(-1000, 1000),
+            st.sampled_from([1, 1, 1, 1, 2]),
+        ),
+        min_size=1,
+        max_size=60,
+    ),
+)
+def test_whole_blocks_are_placed_as_sample_by_sample(
+    first: int, us_offset: int, blocks: list[tuple[int, int, int, int]]
+) -> None:
+    quick, careful = SequenceTracker(256.0), SampleBySample(256.0)
+    for count, lost, late_us, boot in blocks:
+        first = max(0, first + lost)
+        raw = raw_of([*range(first, first + count)], boot, us_offset + late_us)
+        first += count
+        for one, other in zip(quick.accept(raw), careful.accept(raw), strict=True):
+            if not isinstance(one, RawBlock):
+                assert one == other
+                continue
+            assert isinstance(other, RawBlock)
+            assert (one.boot, one.calibrated) == (other.boot, other.calibrated)
+            for name in ("seq", "device_us", "codes", "arrived_ns", "quality"):
+                np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+        assert vars(quick) == vars(careful)
+
+
 def test_microseconds_are_unwrapped_over_a_long_silence() -> None:
     tracker = SequenceTracker(256.0)
     hours = 256 * 3600 * 5

@@ -12,6 +12,7 @@ from rigwatch.physics.engine.equations.measured_motion import (
     has_hidden_states,
     predicted_outputs,
     sensor_states,
+    unjudged_along_motion,
     unmoved_at_rest,
 )
 from rigwatch.physics.engine.equations.model import (
@@ -285,3 +286,12 @@ def test_sensor_states_are_those_that_no_other_state_needs() -> None:
     assert sensor_states(shipped_models()["servo-pneumatic"]) == {"mean"}
     # The actuator's force moves the mass.
     assert sensor_states(_actuated_mass()) == frozenset()
+
+
+def test_a_parameter_that_moves_only_measured_states_is_lost_along_the_motion() -> None:
+    model = _actuated_mass()
+    assert unjudged_along_motion(model) == frozenset()
+    # Only the force's own gauge is left to predict: it shows nothing of what the mass does.
+    gauge = Output(unit="N", expression="f")
+    shown = replace(model, outputs={"position": model.outputs["position"], "force": gauge})
+    assert unjudged_along_motion(shown) == {"k", "c"}

@@ -14,7 +14,7 @@ from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.physics.engine.fit.windowed_fit import fit
 from rigwatch.wire.errors import ConfigError, ModelError
 from rigwatch.wire.typed_files.loading import parse
-from rigwatch.wire.units import NONE, UnitError, describe, unit_of
+from rigwatch.wire.units import NONE, UnitError, describe, simplified, unit_of
 from rigwatch.wire.units.unit_table import ENTRIES
 
 MOTOR = """
@@ -123,6 +123,28 @@ def test_every_unit_of_the_table_can_be_read_back_from_its_si_unit() -> None:
         assert unit_of(entry.si).plain
 
 
+@pytest.mark.parametrize(
+    ("text", "plain"),
+    [
+        ("(N m)/((rad/s)*(rad/s))", "N m s^2/rad^2"),
+        ("N/(m*m*m)", "N/m^3"),
+        ("(V)/(V)", "1"),
+        ("1/(mm/s)", "s/mm"),
+        ("l/(min bar^0.5)", "l/(min bar^(1/2))"),
+        ("(m/s)^2/kg/K", "m^2/(s^2 kg K)"),
+        ("degC", "degC"),
+        ("", ""),
+    ],
+)
+def test_brackets_of_a_unit_are_multiplied_out(text: str, plain: str) -> None:
+    assert simplified(text) == plain
+    if text:
+        assert (unit_of(plain).dimension, unit_of(plain).factor) == (
+            unit_of(text).dimension,
+            pytest.approx(unit_of(text).factor),
+        )
+
+
 @pytest.mark.parametrize("value", [0.1, 1 / 3, 1e-300, 7.3e9, -0.0, math.inf, -math.inf])
 @pytest.mark.parametrize("text", ["N s/m", "m/s^2", "N/(m/s)", "V", "1", "", "m/(s V)", "kg m^2"])
 def test_a_value_that_is_si_stays_to_the_bit(text: str, value: float) -> None:
@@ -224,6 +246,24 @@ def test_the_gram_where_gravity_is_meant_gets_a_hint(unit: str) -> None:
         compose(parse(text, Model, "spring"))
     fine = compose(parse(text.replace(f'"{unit}"', '"g0"'), Model, "spring"))
     assert fine.parameters["gravity"].value == 9.80665
+
+
+@pytest.mark.parametrize(
+    ("expression", "hint"),
+    [
+        pytest.param("m*9.81", "(a number has no unit: make it a parameter", id="a number"),
+        pytest.param("load - 20", "(a number has no unit: make it a parameter", id="one taken off"),
+        pytest.param("m*position", "", id="neither"),
+    ],
+)
+def test_a_mass_in_grams_gets_the_hint_that_its_equation_needs(expression: str, hint: str) -> None:
+    text = SPRING.replace('"k*position + load"', f'"{expression}"')
+    text += '[parameters.m]\nvalue = 2.0\nunit = "g"\n'
+    with pytest.raises(ModelError, match="found") as refused:
+        compose(parse(text, Model, "spring"))
+    assert "is the gram" not in str(refused.value)
+    assert hint in str(refused.value)
+    assert hint or "no unit" not in str(refused.value)
 
 
 def test_the_same_model_in_other_units_has_the_same_fit() -> None:

@@ -42,6 +42,7 @@ from rigwatch.wire.bus.connection import (
     open_router,
 )
 from rigwatch.wire.bus.inbox import Inbox
+from rigwatch.wire.bus.kept_messages import KeptMessages
 from rigwatch.wire.bus.member import unique_process
 from rigwatch.wire.bus.message_ring import SAID_KEY
 from rigwatch.wire.bus.ring_questions import RingQuestions
@@ -67,6 +68,7 @@ __all__ = [
     "DeviceReply",
     "DeviceRequest",
     "Inbox",
+    "KeptMessages",
     "ModelReply",
     "ModelRequest",
     "Place",

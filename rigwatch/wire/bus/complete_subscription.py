@@ -17,7 +17,7 @@ from itertools import groupby
 from typing import Any
 
 from rigwatch.wire.access import alarm_roles
-from rigwatch.wire.bus.alarm_shares import AlarmShares
+from rigwatch.wire.bus.alarms import AlarmShares, Retold
 from rigwatch.wire.bus.inbox import Inbox
 from rigwatch.wire.bus.member import Member
 from rigwatch.wire.bus.message_ring import SAID_KEY, ring_key
@@ -78,6 +78,7 @@ class CompleteSubscription(Subscription):
         self._runs: dict[int, str] = {}
         self._ended: dict[int, float] = {}
         self._assumed: dict[str, int] = {}
+        self._unconfirmed: dict[str, list[Token]] = {}
         self._early = EarlyMessages()
         self._inbox: Inbox[Any] = Inbox(capacity)
         self._ready: deque[bytes | Gap] = deque()  # decoded by the call that returns them
@@ -87,6 +88,7 @@ class CompleteSubscription(Subscription):
         self._began_ns = time.time_ns() if resume_after is None else 0
         self._looked_at = time.monotonic()
         self._shares = AlarmShares() if topic is ALARMS else None
+        self._retold = Retold() if topic is ALARMS else None
         self._questions = RingQuestions(bus, self._answered)
         self._start(dict(resume_after or {}))
 
@@ -103,6 +105,8 @@ class CompleteSubscription(Subscription):
             self._follow(process, place)
         for token in there:
             self._take_token(token, alive=True)
+            # One that ends before it is watched by its name ends without it.
+            self._unconfirmed.setdefault(token[0], []).append(token)
         for process, place in resume_after.items():
             # Assumed alive until the names of the existing tokens are known.
             self._assumed[process] = place[0]
@@ -246,7 +250,11 @@ class CompleteSubscription(Subscription):
     def _take_name(self, process: str, token: "Token | None", alive: bool, named: bool) -> None:
         self._early.token(process, named=named, alive=alive)
         if token is not None:
+            self._unconfirmed.pop(process, None)
             self._take_token(token, alive)
+        elif not alive:
+            for ended in self._unconfirmed.pop(process, ()):
+                self._take_token(ended, alive=False)
         if named or not alive:
             self._end_assumed(process)
             self._take_early()
@@ -350,7 +358,8 @@ class CompleteSubscription(Subscription):
     def _deliver(self, process: str, message: Numbered) -> None:
         self._looked_at = time.monotonic()
         if self._shares is None or self._shares.admits(process, message.payload):
-            self._ready.append(message.payload)
+            if self._retold is None or not self._retold.is_repeat(process, message):
+                self._ready.append(message.payload)
             return
         if self._shares.is_first_refusal(process):
             text = f"{process} has said more alarms than a rig has; further ones are dropped"

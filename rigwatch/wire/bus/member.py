@@ -5,6 +5,7 @@ import threading
 from collections.abc import Callable
 
 from rigwatch.wire.access import CommandSigner
+from rigwatch.wire.bus.kept_messages import KeptMessages
 from rigwatch.wire.bus.message_ring import LARGEST_NUMBERED, RING_BYTES, Outlet
 from rigwatch.wire.bus.tokens import Changed, NamedToken, NamedTokens
 from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Transport
@@ -62,17 +63,22 @@ class Member:
         else:
             self.transport.put(self.key(topic.key_of(self.process)), payload)
 
-    def announce(self) -> None:
+    def announce(self, kept: KeptMessages | None = None) -> None:
         """Show subscribers who sends numbered messages here, before the first one.
 
         One that is killed before that, and what it said to nobody, is then reported as a gap.
-        """
-        self._numbered()
 
-    def _numbered(self) -> Outlet:
+        Args:
+            kept: file of the alarms that are sent, for the next run of this process.
+        """
+        self._numbered(kept)
+
+    def _numbered(self, kept: KeptMessages | None = None) -> Outlet:
         with self._lock:
             if self._outlet is None:
-                self._outlet = Outlet(self.transport, self.rig, self.process, self._ring_bytes)
+                self._outlet = Outlet(
+                    self.transport, self.rig, self.process, self._ring_bytes, kept
+                )
             return self._outlet
 
     def serve(self, key: str, answer: Answer) -> Close:

@@ -7,6 +7,7 @@ import fnmatch
 import itertools
 import threading
 from collections.abc import Callable, Iterable
+from functools import lru_cache
 from typing import TypeVar
 
 from rigwatch.wire.access import CommandSigner
@@ -15,6 +16,8 @@ from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, Tak
 
 T = TypeVar("T")
 _IDENTITIES = (f"process-{number}" for number in itertools.count(1))
+MATCHES_KEPT = 4096
+"""Keys and patterns whose match is remembered: each message meets the same ones again."""
 
 
 class MemoryNetwork:
@@ -136,6 +139,7 @@ def _with(patterns: Iterable[str], key: str) -> list[str]:
     return [one for one in tuple(patterns) if one == key or ("*" in one and matches(key, one))]
 
 
+@lru_cache(maxsize=MATCHES_KEPT)
 def matches(key: str, pattern: str) -> bool:
     """Whether a key matches a pattern, in which `*` stands for one part of the key."""
     parts, wanted = key.split("/"), pattern.split("/")

@@ -3,7 +3,8 @@
 Every message of a numbered topic is stored in the ring before it is published, with the run of its
 process (a random number drawn at the start) and its number within the run. A liveliness token at
 `said/<process>`, named `<run>/<since>/<identity>`, identifies the sender; queries to
-`ring/<process>/<topic>` return stored messages.
+`ring/<process>/<topic>` return stored messages, of alarms also those of earlier runs if they are
+kept in a file (`kept_messages.py`).
 """
 
 import secrets
@@ -17,10 +18,11 @@ from itertools import chain
 
 import zstandard
 
+from rigwatch.wire.bus.kept_messages import KeptMessages
 from rigwatch.wire.bus.tokens import NamedToken
 from rigwatch.wire.bus.transport import MAX_PAYLOAD, Transport
-from rigwatch.wire.messages import TOPICS, Topic, bus_key
-from rigwatch.wire.ordering import UNKNOWN, Ask, Numbered, RingReply
+from rigwatch.wire.messages import ALARMS, TOPICS, Topic, bus_key
+from rigwatch.wire.ordering import UNKNOWN, Ask, Numbered, PastRuns, RingReply, first_fitting
 
 SAID_KEY = "said"
 RING_BYTES = 32 << 20
@@ -105,15 +107,9 @@ class MessageRing:
             return RingReply(ask.boot, UNKNOWN, ())
         with self._lock:  # for a moment only: it delays publishing
             packs, kept, newest = tuple(self._packs), tuple(self._kept), self._next - 1
-        found: list[Numbered] = []
-        size = 0
-        for message in self._from(ask.first, packs, kept):
-            size += len(message.payload) + 64
-            if message.seq > ask.last or (found and size > REPLY_BYTES):
-                break
-            found.append(message)
+        found = first_fitting(self._from(ask.first, packs, kept), ask.last, REPLY_BYTES)
         settled = found[-1].seq if found else min(ask.last, newest)
-        return RingReply(self._run, settled, tuple(found))
+        return RingReply(self._run, settled, found)
 
     def _from(
         self, first: int, packs: Iterable[Pack], kept: Iterable[Numbered]
@@ -131,28 +127,44 @@ class Outlet:
         transport: carries the bytes.
         rig, process: of the sender.
         ring_bytes: capacity of each topic's ring [bytes].
+        kept: file of the alarms that are sent, None for none; it answers for earlier runs.
     """
 
     def __init__(
-        self, transport: Transport, rig: str, process: str, ring_bytes: int = RING_BYTES
+        self,
+        transport: Transport,
+        rig: str,
+        process: str,
+        ring_bytes: int = RING_BYTES,
+        kept: KeptMessages | None = None,
     ) -> None:
         self.run = 1 + secrets.randbits(52)
+        self._kept = kept
         self._transport = transport
         self._rig = rig
         numbered = [topic.name for topic in TOPICS if topic.numbered]
         self._rings = {name: MessageRing(self.run, ring_bytes) for name in numbered}
+        past = kept.past if kept else None
+        if kept:
+            kept.begin(self.run)
         for topic in TOPICS:
             if topic.numbered:
-                self._serve(bus_key(rig, ring_key(process, topic)), self._rings[topic.name])
+                before = past if topic is ALARMS else None
+                self._serve(bus_key(rig, ring_key(process, topic)), self._rings[topic.name], before)
         self._token = NamedToken(transport, bus_key(rig, f"{SAID_KEY}/{process}"))
         self._token.declare(f"{self.run}/{time.time_ns()}")
 
-    def _serve(self, key: str, ring: MessageRing) -> None:
-        self._transport.serve(
-            key, lambda question: [ring.reply(Ask.from_bytes(question)).to_bytes()]
-        )
+    def _serve(self, key: str, ring: MessageRing, past: PastRuns | None) -> None:
+        def answer(question: bytes) -> list[bytes]:
+            ask = Ask.from_bytes(question)
+            answers = past if past is not None and ask.boot != self.run else ring
+            return [answers.reply(ask).to_bytes()]
+
+        self._transport.serve(key, answer)
 
     def put(self, topic: Topic, payload: bytes) -> None:
         """Store a message, then send it."""
         message = self._rings[topic.name].add(payload)
+        if self._kept and topic is ALARMS:
+            self._kept.write(message)
         self._transport.put(bus_key(self._rig, topic.key), payload, message.mark)

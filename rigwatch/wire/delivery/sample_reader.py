@@ -306,6 +306,8 @@ def _sender(incoming: _Incoming) -> str | None:
 
 def joined(items: list[Item]) -> list[Item]:
     """The items with consecutive sample blocks joined."""
+    if len(items) < 2:  # nearly always
+        return items
     done: list[Item] = []
     run: list[SampleBlock] = []
     for item in items:

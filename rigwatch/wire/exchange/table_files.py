@@ -31,6 +31,8 @@ def read_table(path: Path, mapping: ImportMapping) -> Table:
         MissingExtraError: it is Parquet and pyarrow is not installed.
     """
     kind = mapping.format if mapping.format != "auto" else FORMATS.get(path.suffix.lower(), "")
+    if path.is_dir():
+        raise ImportDataError(f"{path}: found a folder, expected a file such as {path / '*.csv'}")
     if kind not in _READERS:
         known = ", ".join(FORMATS)
         raise ImportDataError(f"{path}: unknown format {path.suffix!r}, expected one of {known}")

@@ -1,5 +1,6 @@
 """Where the fields of a block of samples or estimates lie in its protobuf bytes."""
 
+import struct
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -50,6 +51,18 @@ class Layout:
     times: tuple[int, ...]
     columns: tuple[ColumnPlace, ...]
     fixed: tuple[tuple[int, bytes], ...]
+
+    @cached_property
+    def fixed_parts(self) -> tuple[struct.Struct, tuple[bytes, ...]]:
+        """Takes the parts of `fixed` from a block of equal length in one call, and what they are.
+
+        A look at each of forty parts takes three times as long.
+        """
+        form, at = [], 0
+        for start, part in self.fixed:
+            form.append(f"{start - at}x{len(part)}s")
+            at = start + len(part)
+        return struct.Struct("".join(form)), tuple([part for _, part in self.fixed])
 
     @cached_property
     def names(self) -> tuple[tuple[str, str, bool], ...]:

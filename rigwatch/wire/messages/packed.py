@@ -84,10 +84,8 @@ def _fits(layout: Layout, data: bytes) -> bool:
     for span in (layout.boot, layout.seq):
         if span is not None and filling(data[span[0] : span[1]]) is None:
             return False
-    for start, part in layout.fixed:  # noqa: SIM110 (a generator takes longer)
-        if not data.startswith(part, start):
-            return False
-    return True
+    reader, parts = layout.fixed_parts
+    return reader.unpack(data) == parts
 
 
 def _read(kind: type[K], layout: Layout, data: bytes) -> K:

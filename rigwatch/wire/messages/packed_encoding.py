@@ -4,7 +4,8 @@ The bytes are those of `protobuf.encode`, which makes a Python object of every n
 module does not recognise is left to it.
 """
 
-from collections.abc import Iterator, Sequence
+import struct
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -21,8 +22,11 @@ from rigwatch.wire.messages.message_types import (
 )
 from rigwatch.wire.messages.protobuf import encode
 
-_TAGS = {kind: schema.field_tags(kind) for kind in (Column, SampleBlock, EstimateBlock)}
-_NAME, _UNIT, _VALUES, _QUALITY = (bytes([tag]) for tag in _TAGS[Column].values())
+_TAGS = {
+    kind: tuple([bytes([tag]) for tag in schema.field_tags(kind).values()])
+    for kind in (Column, SampleBlock, EstimateBlock)
+}
+_NAME, _UNIT, _VALUES, _QUALITY = _TAGS[Column]
 _FLOAT, _INT, _BYTE = np.dtype("<f8"), np.dtype("<i8"), np.dtype("u1")
 _LARGEST = 1 << 63
 LENGTHS_KEPT = 512
@@ -39,10 +43,9 @@ def encode_block(block: Block) -> bytes:
     times = [block.device_us, block.t_ns] if isinstance(block, SampleBlock) else [block.t_ns]
     if not _is_plain(block, times, columns):
         return encode(block)
-    device, boot, seq, *places = (bytes([tag]) for tag in _TAGS[type(block)].values())
+    _, _, seq, *places = _TAGS[type(block)]
     parts = [
-        _part(device, block.device.encode()),
-        _number(boot, int(block.boot)),
+        _source(samples, block.device, int(block.boot)),
         _number(seq, int(block.seq)),
         *(_part(tag, one.tobytes()) for tag, one in zip(places[: 1 + samples], times, strict=True)),
     ]
@@ -51,6 +54,13 @@ def encode_block(block: Block) -> bytes:
     else:
         parts += [_column(places[-1], column) for column in columns]
     return b"".join(parts)
+
+
+@lru_cache(maxsize=LENGTHS_KEPT)
+def _source(samples: bool, device: str, boot: int) -> bytes:
+    """The bytes that all blocks of a boot begin with."""
+    device_tag, boot_tag, *_ = _TAGS[SampleBlock if samples else EstimateBlock]
+    return _part(device_tag, device.encode()) + _number(boot_tag, boot)
 
 
 def _is_plain(block: Block, times: list[NDArray[np.int64]], columns: Sequence[Column]) -> bool:
@@ -65,13 +75,20 @@ def _is_plain(block: Block, times: list[NDArray[np.int64]], columns: Sequence[Co
     )
 
 
-def _rows(tag: bytes, table: ColumnTable) -> Iterator[bytes]:
+def _rows(tag: bytes, table: ColumnTable) -> list[bytes]:
     """The bytes of each column's head and of its values."""
-    values = table.values.tobytes()
     size = table.values.itemsize * table.values.shape[1]
-    for place, head in enumerate(_heads(tag, table.names, size)):
-        yield head
-        yield values[place * size : (place + 1) * size]
+    heads = _heads(tag, table.names, size)
+    parts = [b""] * (2 * len(heads))
+    parts[::2] = heads
+    parts[1::2] = _cutter(len(heads), size).unpack(table.values.tobytes())
+    return parts
+
+
+@lru_cache(maxsize=TABLES_KEPT)
+def _cutter(count: int, size: int) -> struct.Struct:
+    """Cuts the bytes of a table into those of its columns; a slice for each costs more."""
+    return struct.Struct(f"{size}s" * count)
 
 
 @lru_cache(maxsize=TABLES_KEPT)

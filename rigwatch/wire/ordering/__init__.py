@@ -3,7 +3,8 @@
 `sample_order` orders received samples and reports losses (`outcomes`), `stream` keeps those of one
 boot until their turn, `source_arbitration` decides which of several sources has control,
 `ownership` which process may send for it, and `ring_protocol` defines a reader's queries to a ring.
-Samples and numbered messages use the same logic. `sender_rates` bounds what each client may send.
+`past_runs` answers them for the earlier runs of a process. Samples and numbered messages use the
+same logic. `sender_rates` bounds what each client may send.
 """
 
 from rigwatch.wire.ordering.numbered import Numbered
@@ -16,11 +17,13 @@ from rigwatch.wire.ordering.outcomes import (
     Remark,
 )
 from rigwatch.wire.ordering.ownership import Owners
-from rigwatch.wire.ordering.ring_protocol import OPEN, UNKNOWN, Ask, RingReply
+from rigwatch.wire.ordering.past_runs import PastRun, PastRuns, first_fitting
+from rigwatch.wire.ordering.ring_protocol import EMPTY, OPEN, UNKNOWN, Ask, RingReply
 from rigwatch.wire.ordering.sample_order import LARGEST_SEQ, SampleOrder
 from rigwatch.wire.ordering.sender_rates import SenderRates
 
 __all__ = [
+    "EMPTY",
     "FORGED",
     "LARGEST_SEQ",
     "OPEN",
@@ -32,8 +35,11 @@ __all__ = [
     "Numbered",
     "Outcome",
     "Owners",
+    "PastRun",
+    "PastRuns",
     "Remark",
     "RingReply",
     "SampleOrder",
     "SenderRates",
+    "first_fitting",
 ]

@@ -6,7 +6,8 @@
 A reply settles the samples from `first` to `settled`: those not in its blocks are lost. If
 `settled` is less than `last`, the reader queries again from there. A ring without that
 boot replies with `settled` = -1, and with a sample of the boot before its present one if it has
-any: a reader that was away for the whole of that boot learns of it so.
+any: a reader that was away for the whole of that boot learns of it so. A ring that answers for an
+ended boot adds, behind its last sample, one of the boot that came next.
 """
 
 import struct
@@ -25,6 +26,8 @@ OPEN = 2**62
 """As `last` of a query: everything available."""
 UNKNOWN = -1
 """As `settled` of a reply: the ring has nothing of that boot."""
+EMPTY = -2
+"""As `settled` of a reply: the boot has ended, and there was nothing in it."""
 
 _QUESTION = struct.Struct("<qqq")
 _REPLY = struct.Struct("<qq")

@@ -79,12 +79,31 @@ class SampleOrder(Generic[S]):
 
     def on_block(self, block: S) -> list[Outcome[S]]:
         """Process a block received from the bus."""
+        if self._goes_on(block):
+            return [block]
         if 0 <= block.seq <= LARGEST_SEQ - len(block):
             if len(block):
                 self._admit(block)
         else:
             self.counters.foreign += len(block)
         return self._outcomes()
+
+    def _goes_on(self, block: S) -> bool:
+        """Deliver a block that simply follows the last one, as nearly all do.
+
+        What the other steps would do with it, in a quarter of their time.
+        """
+        front, count = self._line[0] if self._line else None, len(block)
+        if front is None or block.seq != front.next or block.boot != front.boot or not count:
+            return False
+        if front.waiting or front.ended or block.seq > LARGEST_SEQ - count:
+            return False
+        if not self.sources.goes_on(block):
+            return False
+        self._heard_since_ask, self._stale = True, 0
+        front.next += count
+        self.counters.delivered += count
+        return True
 
     def on_reply(self, ask: Ask, reply: RingReply[S] | None) -> list[Outcome[S]]:
         """Process the ring's reply to `ask`; None if there was none."""
@@ -256,7 +275,7 @@ class SampleOrder(Generic[S]):
 
     def _settle(self, ask: Ask, reply: RingReply[S]) -> None:
         front = self._line[0]
-        if reply.settled == UNKNOWN and self._still_sends(front):
+        if reply.settled <= UNKNOWN and self._still_sends(front):
             # Another source's ring: after an interruption it may be reachable first.
             self._no_reply(ask)
             return
@@ -266,13 +285,13 @@ class SampleOrder(Generic[S]):
             if front.ended:
                 self._learn_of(reply.blocks)
             return
-        if reply.settled < ask.first - 1 and not front.ended:
+        if UNKNOWN < reply.settled < ask.first - 1 and not front.ended:
             self._set_back(front, reply.settled + 1)
             return
         if reply.settled < ask.first and ask.last != OPEN:
             self._drop_forged(front)
             return
-        for block in reply.blocks:
+        for block in (one for one in reply.blocks if one.boot == front.boot):
             before = self.counters.delivered
             self._skip(front, min(block.seq, ask.last + 1) - 1, "the ring no longer has them")
             self._take_recovered(front, block, ask.last)
@@ -280,6 +299,7 @@ class SampleOrder(Generic[S]):
         self._skip(front, min(reply.settled, ask.last), "the ring no longer has them")
         if ask.last == OPEN and front.ended and not self._progressed(ask, front):
             self._leave(front)
+            self._learn_of(reply.blocks)
 
     def _learn_of(self, blocks: tuple[S, ...]) -> None:
         """Put a boot that began and ended unseen before the one that has control now."""

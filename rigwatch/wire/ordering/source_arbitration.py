@@ -152,9 +152,19 @@ class Sources:
             return Verdict(control_from=block.seq if self._is_oldest(block.boot) else None)
         return self._other_spoke(block)
 
-    def _current_spoke(self, block: SampleBlock | Numbered) -> Verdict:
+    def goes_on(self, block: SampleBlock | Numbered) -> bool:
+        """Whether the source in control speaks while no other does, which changes nothing."""
+        if block.boot != self.current or self._rivals:
+            return False
+        self._hear(block)
+        return True
+
+    def _hear(self, block: SampleBlock | Numbered) -> None:
         self._silent = False
         self._latest_ns = max(self._latest_ns, int(block.t_ns[-1]))
+
+    def _current_spoke(self, block: SampleBlock | Numbered) -> Verdict:
+        self._hear(block)
         if not self._rivals:
             return NO_CHANGE
         for rival in self._rivals.values():

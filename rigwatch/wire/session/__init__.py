@@ -22,7 +22,7 @@ from rigwatch.wire.session.reader import (
     Session,
     open_session,
 )
-from rigwatch.wire.session.segment import SUFFIX, is_segment, segment_name
+from rigwatch.wire.session.segment import SUFFIX, is_segment, names_segment, segment_name
 from rigwatch.wire.session.span import Part, Place, Wanted, read_page
 from rigwatch.wire.session.summary import ChannelSummary, DeviceSummary, Summary, summarise
 from rigwatch.wire.session.writer import SessionWriter, message_time, run_info
@@ -48,6 +48,7 @@ __all__ = [
     "iso_time",
     "merge_pending",
     "message_time",
+    "names_segment",
     "open_session",
     "read_page",
     "recover",

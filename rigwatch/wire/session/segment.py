@@ -12,6 +12,11 @@ def segment_name(number: int) -> str:
     return f"{number:06d}{SUFFIX}"
 
 
+def names_segment(name: str) -> bool:
+    """Whether a file of that name is a segment."""
+    return _NAME.fullmatch(name) is not None
+
+
 def is_segment(path: PurePath) -> bool:
     """Whether a file is named like a segment."""
-    return _NAME.fullmatch(path.name) is not None
+    return names_segment(path.name)

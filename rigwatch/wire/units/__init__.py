@@ -9,8 +9,10 @@ from rigwatch.wire.units.unit import (
     describe,
     is_unit,
     names_gram,
+    simplified,
     times,
     unit_of,
+    with_gravity,
 )
 from rigwatch.wire.units.unit_table import Dimension
 
@@ -25,6 +27,8 @@ __all__ = [
     "is_unit",
     "may_count_turns",
     "names_gram",
+    "simplified",
     "times",
     "unit_of",
+    "with_gravity",
 ]

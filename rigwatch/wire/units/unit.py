@@ -19,6 +19,7 @@ from rigwatch.wire.units.unit_table import BASES, ENTRIES, IN_OTHER_WORDS, Dimen
 
 NONE: Dimension = (Fraction(0),) * len(BASES)
 """Of a pure number."""
+_GRAM = re.compile(r"(?<![A-Za-z])m?g(?![A-Za-z0-9])")
 GRAM = "the unit g is the gram, write g0 for standard gravity"
 _POWER = r"-?\d+(?:\.\d+)?|\(-?\d+(?:\.\d+|/[1-9]\d?)?\)"
 _EXPONENT = rf"(?:(?:\^|\*\*)(?P<{{0}}>{_POWER}))?"
@@ -189,6 +190,45 @@ def _product(tokens: list[_Token], unit: str, depth: int) -> tuple[Dimension, Fr
     return dimension, factor
 
 
+def simplified(text: str) -> str:
+    """A unit with its brackets multiplied out: (N m)/((rad/s)*(rad/s)) is N m s^2/rad^2.
+
+    Nothing stays nothing.
+
+    Raises:
+        UnitError: a part of it is unknown.
+    """
+    if not text:
+        return ""
+    powers = _powers(_tokens(_plainly(text)))
+    above = [_raised_text(name, power) for name, power in powers.items() if power > 0]
+    below = [_raised_text(name, -power) for name, power in powers.items() if power < 0]
+    divided = f"/({' '.join(below)})" if len(below) > 1 else "".join(f"/{one}" for one in below)
+    return (" ".join(above) or "1") + divided
+
+
+def _powers(tokens: list[_Token]) -> dict[str, Fraction]:
+    """The exponents of a product's units, by their names; takes the tokens up to its bracket."""
+    found, sign = dict[str, Fraction](), 1
+    while tokens:
+        token = tokens.pop(0)
+        if token.name == ")":
+            return {name: power * token.power for name, power in found.items()}
+        if token.name in ("*", "/"):
+            sign = -1 if token.name == "/" else 1
+            continue
+        inner = _powers(tokens) if token.entry is None else {token.name: token.power}
+        for name, power in inner.items():
+            found[name] = found.get(name, Fraction(0)) + sign * power
+        sign = 1
+    found.pop("1", None)
+    return found
+
+
+def _raised_text(name: str, power: Fraction) -> str:
+    return name if power == 1 else f"{name}^{_written(power)}"
+
+
 def _raised(factor: Fraction, power: Fraction) -> Fraction:
     return factor ** int(power) if power.denominator == 1 else Fraction(float(factor) ** power)
 
@@ -231,4 +271,9 @@ def _written(exponent: Fraction) -> str:
 
 def names_gram(text: str) -> bool:
     """Whether a unit contains the symbol of the gram, often misread as standard gravity."""
-    return bool(re.search(r"(?<![A-Za-z])m?g(?![A-Za-z0-9])", text))
+    return bool(_GRAM.search(text))
+
+
+def with_gravity(text: str) -> str:
+    """A unit with standard gravity in place of the gram."""
+    return _GRAM.sub("g0", text)

@@ -130,10 +130,15 @@ def _judged(study: Study, along: Study, used: Data, scale: FloatArray, found: Fi
     return Tried(base, found, study, along, used)
 
 
-def shared_values(at: Tried, other: Study) -> dict[str, float]:
-    """Fitted values of one base for the parameters that another has with the same meaning."""
-    before, values = at.study.model.parameters, at.fitted.train.values()
-    own = other.model.parameters
+def shared_values(study: Study, fit: Fit, other: Study) -> dict[str, float]:
+    """Fitted values of a base for the parameters that another has with the same meaning.
+
+    Args:
+        study: the base.
+        fit: its fit.
+        other: the other base.
+    """
+    before, values, own = study.model.parameters, fit.values(), other.model.parameters
     return {n: values[n] for n, p in own.items() if n in values and before.get(n) == p}
 
 

@@ -4,7 +4,8 @@ A verdict is only as good as the base model. The model is fitted to the first pa
 recordings and judged on the rest. Variants of its laws and effects that a healthy machine has are
 then added one at a time, best first, as long as the error on the rest falls, over blocks, by more
 than chance. A variant with fewer parameters is taken if it does equally well. A variant may replace
-those of its group that it excludes.
+those of its group that it excludes. A fit that ends above that of a base with less in it is begun
+anew from that base's values, so that no variant is refused for a minimum of another.
 
 Along the measured motion every candidate is fitted briefly, to the beginning of the recording.
 """

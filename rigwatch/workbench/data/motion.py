@@ -2,8 +2,9 @@
 
 With unknown initial pressures, fluxes or temperatures free runs drift. Driven by the measured
 motion these states converge within a fraction of a second, and a whole recording is one run without
-windows. This form is used if channels measure some but not all of a model's states and at least one
-output remains to be predicted; a study can request either form (`prediction`).
+windows. This form is used if channels measure some but not all of a model's states, at least one
+output remains to be predicted, and no parameter is lost on which a free run depends; a study can
+request either form (`prediction.py`).
 """
 
 from collections.abc import Mapping

@@ -5,6 +5,7 @@ from rigwatch.physics.engine.equations import (
     has_hidden_states,
     measured_states,
     predicted_outputs,
+    unjudged_along_motion,
 )
 from rigwatch.workbench.study import Study
 
@@ -19,7 +20,9 @@ def predicts_along_motion(study: Study) -> bool:
     if study.file.prediction != "auto":
         return study.file.prediction == "measured motion"
     model = study.model
-    return not model.rough and has_hidden_states(model) and bool(predicted_outputs(model))
+    if model.rough or not (has_hidden_states(model) and predicted_outputs(model)):
+        return False
+    return not unjudged_along_motion(model)
 
 
 def form_along_motion(model: Model) -> str:

@@ -18,6 +18,7 @@ from rigwatch.physics.engine.fit import Fit
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench, find_base, open_bench
+from rigwatch.workbench.compare.base_step import AT_NOISE
 from rigwatch.workbench.data import METHODS, NoiseFloor, from_residual
 from rigwatch.workbench.explain.verdict import Verdict, not_converged
 from rigwatch.workbench.ranking import Progress
@@ -190,7 +191,8 @@ def with_adequate_base(bench: Bench, progress: Progress) -> Bench:
     """The bench, or one on a base that the healthy recordings ask for.
 
     One is looked for if the study's own is inadequate, or leaves more than the noise that repeated
-    periods show: a rig whose laws differ a little from the model's has effects on healthy days.
+    periods show: a rig whose laws differ a little from the model's has effects on healthy days. Of
+    an adequate one the search leaves little but noise: what it left would hide small effects.
 
     Args:
         bench: of a study; one with accepted effects keeps its base.
@@ -205,7 +207,7 @@ def with_adequate_base(bench: Bench, progress: Progress) -> Bench:
     told = "does not describe the healthy rig" if lacks else "leaves more than the healthy noise"
     progress(f"the model {told}: searching for a better base")
     try:
-        better = _on_found_base(bench.study, ENOUGH if lacks else CLOSE, progress)
+        better = _on_found_base(bench.study, ENOUGH if lacks else AT_NOISE, progress)
     except ModelError:
         return bench
     if better is None or _is_inadequate(better, _on_healthy(better)):

@@ -99,24 +99,26 @@ def explained(bench: Bench, progress: Progress = no_progress) -> Explained:
 def _with_rarer(first: Explained, progress: Progress) -> Explained:
     """The explanation; by the whole library if no usual effect explains the error.
 
-    Effects are fitted again only if the score of a rarer one, corrected for the number of all, is
-    more than chance. Where a healthy recording checks a model along its measured motion, rarer ones
-    are tried as refinements already, and fits take long.
+    An effect that is named although much is left may be the likeness of a rarer one, as friction is
+    of friction behind a gap: it gives way to one that leaves nothing. Effects are fitted again only
+    if the score of a rarer one, corrected for the number of all, is more than chance. Where a
+    healthy recording checks a model along its measured motion, rarer ones are tried as refinements
+    already, and fits take long.
     """
     bench, told = first.bench, first.explanation
-    rarer = suitable(bench.study)[1]
-    explained = told.verdict != "unknown_effect" or told.exchange is not None
-    if explained or not rarer or not tries_rarer(bench.study):
+    unknown, rarer = told.verdict == "unknown_effect", suitable(bench.study)[1]
+    unexplained = told.exchange is None and (unknown or bool(told.remains))
+    if not unexplained or not rarer or not tries_rarer(bench.study):
         return first
     wider = with_whole_library(bench.study)
     rows = rank_all(wider, bench.data, bench.base)
     if not any(row.effect in rarer and row.p_value < BY_CHANCE for row in rows):
-        return _with_text(first, f"{told.text}; nor is it like one of {len(rarer)} rarer ones")
+        return _unless_named(first, f"nor is it like one of {len(rarer)} rarer ones")
     progress(f"no usual effect explains the error: trying {len(rarer)} rarer ones")
     second = _explained_once(replace(bench, study=wider), progress)
     found = second.explanation
-    if found.verdict not in STRENGTH_TOLD:
-        return _with_text(first, f"{told.text}; nor does one of {len(rarer)} rarer ones")
+    if found.verdict not in STRENGTH_TOLD or (found.remains and not unknown):
+        return _unless_named(first, f"nor does one of {len(rarer)} rarer ones")
     text = RARER.format(text=found.text, count=len(rarer))
     unlike = "; ".join([*filter(None, [found.unlike]), SECOND_PASS])
     doubted = replace(found, text=text, unlike=unlike, wrong_probability=None, wrong_at_most=None)
@@ -129,8 +131,12 @@ def tries_rarer(study: Study) -> bool:
     return not (checked or study.model.rough)
 
 
-def _with_text(found: Explained, text: str) -> Explained:
-    return replace(found, explanation=replace(found.explanation, text=text))
+def _unless_named(found: Explained, more: str) -> Explained:
+    """An explanation that names no effect, with a further remark; any other unchanged."""
+    told = found.explanation
+    if told.verdict != "unknown_effect":
+        return found
+    return replace(found, explanation=replace(told, text=f"{told.text}; {more}"))
 
 
 def with_whole_library(study: Study) -> Study:

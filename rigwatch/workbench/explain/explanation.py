@@ -81,7 +81,7 @@ class Explanation:
         unlike: why no simulated case is like this one, in words; empty if some are.
         altered: how the logs differ from faultless ones, in words; `like_this` counts such logs
             where `unlike` is empty.
-        remains: share of the error's energy above the noise floor that a missing effect leaves, so
+        remains: share of the error's energy above the noise floor that the effect named leaves, so
             that more is missing; 0 if it, or the set that it was judged in, explains the error.
         exchange: an effect that describes the last accepted one better, if nothing beside it
             explains the error; None if none does, or if that was not asked.
@@ -175,7 +175,7 @@ def _unlike_training(bench: Bench, verdict: Verdict) -> list[str]:
 
 def _remains(bench: Bench, verdict: Verdict) -> float:
     """Share of the error's energy that the effect named leaves, 0 beside a set that explains it."""
-    best = verdict.best if verdict.word == "missing_effect" else None
+    best = verdict.best if verdict.word in STRENGTH_TOLD else None
     if best is None or best.fitted is None or verdict.beside or verdict.second:
         return 0.0
     return remaining_share(bench.base, best, bench.floor)

@@ -236,7 +236,17 @@ def _nothing_found(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> V
     if fitted:
         nearest = min(fitted, key=lambda row: row.held_out_error)
         text += f"; nearest is {nearest.label}, refused: {nearest.reason}"
-    return Verdict("unknown_effect", None, (), (), text + noise)
+    return Verdict("unknown_effect", None, (), (), text + _untried(rows) + noise)
+
+
+def _untried(rows: Sequence[Ranked]) -> str:
+    """A remark on effects that resemble the residual and of which no fit was possible."""
+    failed = [row for row in rows if row.likely and row.failure]
+    if not failed:
+        return ""
+    first = min(failed, key=lambda row: row.p_value)
+    more = f" and {len(failed) - 1} more" if len(failed) > 1 else ""
+    return f"; {first.label}{more} may be it, but cannot be fitted: {first.failure}"
 
 
 def _like_noise(rows: Sequence[Ranked], floor: NoiseFloor) -> str:

@@ -30,6 +30,7 @@ from rigwatch.physics.engine.search import (
     ShortHorizons,
     WholeRuns,
     at_other_values,
+    begun_anew_nearby,
     continued_spread,
     convergence,
     fit_continued,
@@ -256,7 +257,8 @@ def _trained(  # noqa: PLR0917 -- the arguments of `fit_model`
     if search:
         best, ended = multi_start_fit(search)
         found = _settled(study, data, best, horizon, substeps)
-        return found, ended if found is best else at_other_values(ended, found), horizon
+        ended = ended if found is best else at_other_values(ended, found)
+        return begun_anew_nearby(found, data.train, horizon, substeps), ended, horizon
     free_run = study.model.states and not data.along_motion
     if free_run and (horizon >= LONG or from_short_horizons):
         begin = fit_over(horizon // SHORTER, start=begin).parameters

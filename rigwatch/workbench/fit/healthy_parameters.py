@@ -55,8 +55,11 @@ def with_healthy_parameters(study: Study, data: Data, scale: FloatArray | None =
     repeat = repeat_along_motion(healthy)
     uncertain = covariance(found.train, repeat)[0][np.ix_(places, places)]
     fitted = Kept(tuple(kept), uncertain, found.convergence)
+    # Every later fit begins with the values under [start], and these are settled now.
+    start = {name: value for name, value in study.file.start.items() if name not in kept}
     return replace(
         study,
+        file=structs.replace(study.file, start=start),
         model=with_values(study.model, found.train.values()),
         kept=with_known(fitted, healthy, found),
     )

@@ -12,6 +12,7 @@ from rigwatch.workbench.ranking.acceptance import (
     STEP,
     judge_fit,
     left_over,
+    neutral_strength,
     vanishing_shape,
 )
 from rigwatch.workbench.ranking.candidates import candidates, shapes_of, suitable
@@ -60,6 +61,7 @@ __all__ = [
     "in_order",
     "judge_fit",
     "left_over",
+    "neutral_strength",
     "no_progress",
     "order_of",
     "orders_at_port",

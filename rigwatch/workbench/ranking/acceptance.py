@@ -10,7 +10,8 @@ from functools import cache
 
 import sympy
 
-from rigwatch.physics.engine.equations import Effect, names_in, parse, symbol
+from rigwatch.physics.engine.equations import Effect, Placement, names_in, parse, symbol
+from rigwatch.physics.engine.fit import Fit
 from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.fit import Fitted, interval_with_held
 from rigwatch.workbench.ranking.paired_test import Difference, difference
@@ -54,23 +55,26 @@ def _refused(found: Difference) -> str:
 
 
 def _undetermined_strength(row: Ranked) -> str | None:
-    """Reason if the strength's interval contains its neutral value, otherwise None.
+    """Reason if the strength's interval contains its neutral value, otherwise None."""
+    assert row.fitted is not None
+    found = neutral_strength(row.fitted.train, row.placement)
+    return found and f"the training does not determine its strength: {found}"
+
+
+def neutral_strength(found: Fit, placement: Placement) -> str | None:
+    """An effect's strength with its interval, if that contains the neutral value; otherwise None.
 
     Shape parameters that vanish with the effect are held: a strength correlated with them alone is
     imprecise, but not neutral.
     """
-    assert row.fitted is not None
-    effect, prefix = row.placement.effect, row.placement.prefix
+    effect, prefix = placement.effect, placement.prefix
     name = effect.strength
     shape = [prefix + other for other in vanishing_shape(effect)]
-    interval = interval_with_held(row.fitted.train, prefix + name, shape)
+    interval = interval_with_held(found, prefix + name, shape)
     p = effect.parameters[name]
     if p.role == "switch" or interval is None or not interval[0] <= p.neutral <= interval[1]:
         return None
-    return (
-        "the training does not determine its strength:"
-        f" {name} = {interval[0]:.3g} … {interval[1]:.3g}"
-    )
+    return f"{name} = {interval[0]:.3g} … {interval[1]:.3g}"
 
 
 def vanishing_shape(effect: Effect) -> list[str]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 from rigwatch.physics.engine.compile import cores, side_by_side
@@ -38,8 +39,9 @@ def refit(
         row: the effect; its fit and the decision are stored in it.
         fitting: `fit_model` accepts the first minimum, `fit_with_retry` also searches elsewhere.
     """
-    start, fits, failures = base.train.values() | row.begin(), list[Fitted](), list[str]()
-    for placement in orders_at_port(study, base, row):
+    fits, failures = list[Fitted](), list[str]()
+    begun = _starts(study, data, base, row)
+    for placement, start in product(orders_at_port(study, base, row), begun):
         placements = (*base.placements, placement)
         try:
             fits.append(fitting(study, data, placements, start, base.train.scale, base=base))
@@ -50,6 +52,20 @@ def refit(
         return
     row.fitted = min(fits, key=lambda fitted: fitted.train_error)
     judge_fit(base, row)
+
+
+def _starts(study: Study, data: Data, base: Fitted, row: Ranked) -> list[dict[str, float]]:
+    """Initial values of a row's fits: where the base model ended, and from given values.
+
+    A parameter that a free run leaves open may have run off, as a heat capacity to infinity, from
+    where a fit with the effect that is missing does not come back.
+    """
+    ended = base.train.values() | row.begin()
+    if base.convergence is None or data.along_motion:
+        return [ended]
+    own, given = study.model.parameters, study.file.start
+    again = {n: given.get(n, own[n].value) for n in base.convergence.undetermined if n in own}
+    return [ended, ended | again] if again else [ended]
 
 
 def fit_started(known: Callable[[Study, Sequence[Placement]], Mapping[str, float]]) -> Fitting:

@@ -100,8 +100,9 @@ def imported(
             any_unit=True,
         )
         made = import_file(path, files.to_write(f"{path.stem}.mcap"), mapping)
-        stated[path.stem] = stated_values(table, logs.stated, model)
-        told = (*found.remarks, *made.remarks[1:], *unused_numbers(table, logs.stated))
+        stated[path.stem], of_units = stated_values(table, logs.stated, model)
+        unused = unused_numbers(table, logs.stated)
+        told = (*found.remarks, *made.remarks[1:], *of_units, *unused)
         remarks += [(path.name, remark) for remark in told]
         reading = reading or found
     return reading or Matched({}, "", {}, ()), _each_once(remarks), stated

@@ -23,6 +23,7 @@ from rigwatch.workbench.ranking import (
     Progress,
     Ranked,
     accepted_from,
+    neutral_strength,
     no_progress,
     rank_only,
     refit_nested,
@@ -145,6 +146,7 @@ def try_add(
     line |= _evidence(in_set) | ({} if supported else {"reason": f"added anyway: {row.reason}"})
     errors, text = (after.train_error, again), _falls(row, before, again)
     text = f"{text}; {in_set.text(before.told_in)}" if in_set is not None else text
+    text += _no_longer_needed(warm.bench(changed))
     change = Change("add", effect, where, before, after, errors, text)
     return Trial(study, changed, change, _which(change) | line | _numbers(after))
 
@@ -181,6 +183,20 @@ def _falls(row: Ranked, before: Comparison, after: float) -> str:
     at_first, then = before.told(before.held_out_error), before.told(after)
     error = f"{error_text(then, at_first)} {before.told_in}"
     return f"{row.label}: held-out error {at_first:.4g} → {error}"
+
+
+def _no_longer_needed(bench: Bench) -> str:
+    """Earlier effects whose strength is neutral beside the new one, in words; empty without one."""
+    own, found = bench.base, []
+    for count, placement in enumerate(reversed(own.placements[:-1]), start=2):
+        strength = neutral_strength(own.train, placement)
+        if strength is not None:
+            found.append(
+                f"; {placement.name}@{placement.port} is no longer needed ({strength}): to take it"
+                f" out, `rigwatch undo {bench.study.folder}` {count} times, then add what came"
+                " after it"
+            )
+    return "".join(found)
 
 
 def _told(error: float, where: Comparison) -> str:

@@ -20,7 +20,7 @@ def check_new(folder: Path) -> None:
     """
     for name, what in ((FILE, "a study"), (LEDGER, "the ledger of a study")):
         if (folder / name).exists():
-            raise ConfigError(folder / name, "", what, "a folder without one")
+            raise ConfigError(folder / name, "", what, "a folder without one: take another")
 
 
 def start_study(folder: Path, text: str) -> Study:

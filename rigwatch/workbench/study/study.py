@@ -175,13 +175,15 @@ class Study:
 
 
 def open_study(folder: Path | str) -> Study:
-    """The study in `folder`.
+    """The study in `folder`, which may also be given as its file.
 
     Raises:
         ConfigError: there is none, or its file is invalid.
         ModelError: its model or one of its effects is unknown.
     """
     folder = Path(folder)
+    if folder.name == FILE and folder.is_file():
+        folder = folder.parent
     path = folder / FILE
     settle(folder)
     if not path.is_file():

@@ -102,7 +102,8 @@ class StudyFile(Section, frozen=True, kw_only=True):
         Literal["auto", "measured motion", "free"],
         Meta(
             description="along the measured motion, or free runs over horizons; auto: along the"
-            " motion if channels show some of the model's states but not all"
+            " motion if channels show some of the model's states but not all, and every parameter"
+            " that acts on an output of a free run then still acts on one"
         ),
     ] = "auto"
     rate: Annotated[

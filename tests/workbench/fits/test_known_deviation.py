@@ -87,6 +87,15 @@ def test_a_mass_that_was_weighed_replaces_the_model_files(tmp_path: Path) -> Non
     assert added == pytest.approx(1.96 * 0.01, rel=0.2)
 
 
+def test_a_start_does_not_replace_what_the_healthy_recording_shows(tmp_path: Path) -> None:
+    study = rubbing(tmp_path, run(2, 0.0, 1000), "", "start = { c = 1.3 }")
+    bench = open_bench(study)
+    drag, friction = (bench.base.train.values()[name] for name in ("c", "load_coulomb_Fc"))
+    assert bench.study.model.parameters["c"].value == pytest.approx(0.8, rel=0.05)
+    assert drag == bench.study.model.parameters["c"].value
+    assert friction == pytest.approx(0.3, rel=0.05)
+
+
 def test_a_strength_says_how_it_moves_with_a_mass_that_nobody_weighed(tmp_path: Path) -> None:
     told = []
     for name, keys in (("prior", ""), ("weighed", "start = { m = 1.2 }\ndeviation = { m = 0.1 }")):

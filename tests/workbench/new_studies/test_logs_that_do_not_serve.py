@@ -49,6 +49,11 @@ def test_a_study_file_whose_held_out_recording_is_a_copy_is_told_so(tmp_path):
     assert not any("no evidence" in remark for remark in apart)
 
 
+def test_a_folder_of_logs_is_not_a_log(tmp_path, capsys):
+    assert new(tmp_path, tmp_path) == 2
+    assert f"found a folder, expected a file such as {tmp_path}/*.csv" in capsys.readouterr().err
+
+
 def test_a_log_of_one_row_is_refused(tmp_path, run, capsys):
     single = {name: values[:1] for name, values in run.items()}
     assert new(tmp_path, written(tmp_path / "one.csv", single)) == 2

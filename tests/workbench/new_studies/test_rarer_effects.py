@@ -30,6 +30,15 @@ def binding(x: np.ndarray, v: np.ndarray) -> np.ndarray:
     return 0.2 * np.tanh(v / 0.002) * np.exp(-(((x - 0.008) / 0.002) ** 2))
 
 
+def behind_gap(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """A slider on a spring that the rod pushes through a gap of 6 mm."""
+    pushed, force = 0.0, np.zeros(len(x))
+    for i in range(1, len(x)):
+        before, pushed = pushed, float(np.clip(pushed, x[i] - 0.003, x[i] + 0.003))
+        force[i] = np.clip(force[i - 1] + 100.0 * (pushed - before), -0.4, 0.4)
+    return force
+
+
 def logged(path: Path, seed: int, law: Law | None = None) -> str:
     """A damper with a force by a law, or one that something else pushes at random, slowly."""
     draws = np.random.default_rng(seed).normal(size=(2, 1500))
@@ -70,7 +79,14 @@ def test_rarer_effects_are_counted_apart_and_offered_where_none_explains_the_err
     assert suitable(open_study(folder))[1] == []
 
 
-@pytest.mark.parametrize(("law", "name"), [(stop_below, "stop_below"), (binding, "local_binding")])
+@pytest.mark.parametrize(
+    ("law", "name"),
+    [
+        (stop_below, "stop_below"),
+        (binding, "local_binding"),
+        pytest.param(behind_gap, "jenkins_behind_gap", id="coarser friction leaves much"),
+    ],
+)
 def test_a_rarer_effect_is_named_in_a_second_pass(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], law: Law, name: str
 ) -> None:

@@ -20,7 +20,7 @@ from rigwatch.workbench.compare.compare import compare
 from rigwatch.workbench.data.recorded_columns import read_columns
 from rigwatch.workbench.fit.intervals import identifiability
 from rigwatch.workbench.study.creation import create
-from rigwatch.workbench.study.study import Study
+from rigwatch.workbench.study.study import Study, open_study
 from rigwatch.workbench.study.study_file import Span
 from tests.workbench.machine import studied
 
@@ -172,6 +172,11 @@ def test_a_study_is_not_written_over(made: Made, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="expected a folder without one"):
         create(study.folder, tmp_path / "template.toml")
     assert (study.folder / "study.toml").read_bytes() == before
+
+
+def test_a_study_is_also_found_by_its_file(made: Made) -> None:
+    study = made(good(), good())
+    assert open_study(study.folder / "study.toml").folder == study.folder
 
 
 def test_parameters_that_cannot_be_distinguished_are_named() -> None:

@@ -141,6 +141,30 @@ def test_a_model_without_states_may_move_too(tmp_path: Path) -> None:
     assert found.ranking[0].held_out_error < 0.03
 
 
+def slid(seed: int, zero: float) -> dict[str, np.ndarray]:
+    """`stroked` with a slider on a spring in place of dry friction."""
+    table = stroked(seed, zero)
+    v, spring = table["v"], np.zeros(len(table["v"]))
+    for i in range(1, len(v)):
+        spring[i] = np.clip(spring[i - 1] + 0.01 * (v[i] + v[i - 1]) / 2 / 0.05, -1, 1)
+    friction = spring - np.clip(v / 1e-3, -1, 1)
+    return {"v": v, "force": table["force"] + 0.8 * friction}
+
+
+def test_an_effect_with_memory_is_fitted_where_a_zero_moves(tmp_path: Path) -> None:
+    """Its states run through whole recordings, and through the opening of one held out."""
+    (tmp_path / "model.toml").write_text(DAMPER)
+    text = 'model = "model.toml"\n[thin]\nfactor = 7\nedge = 15\n'
+    for seed, (name, zero) in enumerate(TILTS.items()):
+        recorded(tmp_path / f"{name}.mcap", slid(seed, zero), {"v": "m/s", "force": "N"})
+        text += f'[[{"held_out" if name in "bd" else "train"}]]\nsession = "{name}.mcap"\n'
+    (tmp_path / "template.toml").write_text(text)
+    found = explain(create(tmp_path / "study", tmp_path / "template.toml"))
+    assert found.verdict == "missing_effect"
+    assert found.ranking[0].effect in {"jenkins", "bouc_wen"}, "sharp, they are one law"
+    assert found.ranking[0].held_out_error < 0.03
+
+
 def test_parts_of_one_session_share_a_value(tmp_path: Path) -> None:
     template = sled(tmp_path, friction=0.0)
     text = 'model = "model.toml"\n'

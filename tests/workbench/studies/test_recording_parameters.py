@@ -130,7 +130,7 @@ def test_logs_with_known_loads_become_a_study(tmp_path: Path, capsys) -> None:
     assert re.search(said, capsys.readouterr().err)
 
 
-def stating(folder: Path, factor: float = 1.0) -> list[str]:
+def stating(folder: Path, factor: float = 1.0, number: str = "load") -> list[str]:
     """The logs of the loads as JSON with a header that states each load."""
     template(folder)
     paths = []
@@ -138,7 +138,7 @@ def stating(folder: Path, factor: float = 1.0) -> list[str]:
         _, *rest = (folder / f"{name}.csv").read_text().splitlines()
         rows = [[0.01 * i, *map(float, row.split(","))] for i, row in enumerate(rest)]
         entries = [dict(zip(("time", "push", "v"), row, strict=True)) for row in rows]
-        header = {"rig": {"load": load * factor}, "driver": "x"}
+        header = {"rig": {number: load * factor}, "driver": "x"}
         path = folder / f"{name}.json"
         path.write_text(json.dumps({**header, "entries": entries}))
         paths.append(str(path))
@@ -163,12 +163,23 @@ def test_a_known_value_may_have_a_unit_of_its_own(tmp_path: Path, capsys, name: 
     assert "the unknown unit 'kilo'" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("text", "factor"), [("m=rig.load[kg]", 1.0), ("m=rig.load", 1e3)])
-def test_a_parameter_is_a_number_that_each_log_states(
-    tmp_path: Path, text: str, factor: float
+@pytest.mark.parametrize(
+    ("text", "factor", "number", "told"),
+    [
+        ("m=rig.load[kg]", 1.0, "load", ""),
+        ("m=rig.load", 1e3, "load", "rig.load: no unit in its name, assumed g"),
+        ("m=rig.load_kg", 1.0, "load_kg", "rig.load_kg: read in kg, as its name says"),
+        ("m=rig.load_s", 1e3, "load_s", "rig.load_s: no unit in its name, assumed g"),
+    ],
+)
+def test_a_parameter_is_a_number_that_each_log_states(  # noqa: PLR0917 -- one case
+    tmp_path: Path, capsys, text: str, factor: float, number: str, told: str
 ) -> None:
-    begin = ["study", "new", str(tmp_path / "study"), "--data", *stating(tmp_path, factor=factor)]
+    logs = stating(tmp_path, factor, number)
+    begin = ["study", "new", str(tmp_path / "study"), "--data", *logs]
     assert main([*begin, "--model", str(tmp_path / "model.toml"), "--set", text]) == 0
+    shown = capsys.readouterr()
+    assert told in shown.out + shown.err
     file = open_study(tmp_path / "study").file
     given = {span.session: span.parameters["m"] for span in (*file.train, *file.held_out)}
     assert given == {f"{name}.mcap": pytest.approx(load) for name, load in LOADS.items()}

@@ -16,6 +16,7 @@ from rigwatch.workbench.explain.remaining_error import remaining_share
 from rigwatch.workbench.explain.sets.combination import Combination
 from rigwatch.workbench.explain.sets.several_effects import (
     _Member,
+    _named_alone,
     _with_alternatives,
     may_need_several,
     with_similar,
@@ -117,6 +118,15 @@ def test_at_the_noise_floor_the_training_error_must_fall_too(
     named.fitted = replace(named.fitted, train=base(training).train)
     assert judge(base(error), [named], QUIET).word == word
     assert named.accepted == (word == "missing_effect")
+
+
+def test_what_may_be_it_and_cannot_be_fitted_is_not_passed_over_in_silence() -> None:
+    failed = [row(label, fitted=False) for label in ("dahl@x", "lugre@x")]
+    for each, why in zip(failed, ("too short", "diverged"), strict=True):
+        each.likely, each.failure, each.p_value = True, why, len(why) * 1e-9
+    found = judge(base(2.0), [*failed, row("a@x", 2.0, accepted=False)], PERIODS)
+    assert found.word == "unknown_effect"
+    assert "lugre@x and 1 more may be it, but cannot be fitted: diverged" in found.text
 
 
 def test_what_no_effect_lowers_is_unknown() -> None:
@@ -815,6 +825,15 @@ def test_an_effect_that_equally_good_sets_replace_is_not_said_to_be_missing(inst
     else:
         assert (found.word, found.rivals) == ("undetermined", (instead,))
         assert found.text == "convection@x and radiation@x explain it equally well"
+
+
+def test_of_a_class_the_effect_that_the_sentence_names_is_the_one_to_add() -> None:
+    smoothing, lag = row("digital_smoothing@probe", 1.0), row("lag@heater", 1.0)
+    named = Verdict("missing_effect", lag, ("lag@heater", smoothing.label), (), "")
+    alone = {each.label: each for each in (smoothing, lag)}
+    assert _named_alone(_Member(smoothing, named), alone) is lag
+    del alone[lag.label]
+    assert _named_alone(_Member(smoothing, named), alone) is smoothing
 
 
 # ---- the model's own error --------------------------------------------------------------------

@@ -23,6 +23,7 @@ from rigwatch.physics.engine.equations.measured_motion import (
     measured_states,
     predicted_outputs,
     sensor_states,
+    unjudged_along_motion,
     unmoved_at_rest,
 )
 from rigwatch.physics.engine.equations.model import (
@@ -126,6 +127,7 @@ __all__ = [
     "spelt_out",
     "symbol",
     "units_at",
+    "unjudged_along_motion",
     "unmoved_at_rest",
     "unused_ports",
     "with_variants",

@@ -22,7 +22,7 @@ from rigwatch.physics.engine.equations.expression import parse as parse_expressi
 from rigwatch.physics.engine.equations.in_si import into_si
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.typed_files import Section
-from rigwatch.wire.units import UnitError, unit_of
+from rigwatch.wire.units import UnitError, simplified, unit_of
 
 Text = Annotated[str, Meta(min_length=1)]
 
@@ -182,7 +182,7 @@ def _as_difference(unit: str) -> str:
 
 def resolved(unit: str, units: Mapping[str, str]) -> str:
     """A unit of an effect with references in braces replaced by the port's units."""
-    return unit.format_map({name: _bracketed(value) for name, value in units.items()})
+    return simplified(unit.format_map({name: _bracketed(own) for name, own in units.items()}))
 
 
 def _bracketed(unit: str) -> str:

@@ -39,6 +39,18 @@ def dimension_of(text: str, dimensions: Mapping[str, Dimension], where: str) -> 
         raise ModelError(f"{where}: found {quoted(text)}, which is too deep") from None
 
 
+def has_bare_number(text: str) -> bool:
+    """Whether an expression has a number that may lack a unit: one added, or with decimals."""
+    nodes = list(ast.walk(syntax_tree(text, "")))
+    sums = [n for n in nodes if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add | ast.Sub)]
+    added = [side for each in sums for side in (each.left, each.right)]
+    numbers = [node for node in nodes if isinstance(node, ast.Constant)]
+    return any(
+        isinstance(one.value, int | float) and one.value and (one in added or one.value % 1)
+        for one in numbers
+    )
+
+
 class _Measurer:
     """Walks the syntax tree and computes dimensions."""
 

@@ -93,6 +93,36 @@ def predicted_outputs(model: Model) -> tuple[str, ...]:
     return tuple(n for n, output in outputs.items() if not _named(output.expression) <= given)
 
 
+def unjudged_along_motion(model: Model) -> frozenset[str]:
+    """Free parameters that outputs of a free run depend on, and none once the motion is given.
+
+    They act on measured states alone, as a tyre's stiffness does if the travel of its suspension is
+    measured.
+
+    Args:
+        model: not transformed.
+
+    Raises:
+        ModelError: no output is left to predict.
+    """
+    free = frozenset(name for name, parameter in model.parameters.items() if not parameter.fixed)
+    return free & (_reached(spelt_out(model)) - _reached(along_measured_motion(model)))
+
+
+def _reached(model: Model) -> frozenset[str]:
+    """Names on which outputs depend, directly or through states."""
+    outputs = model.outputs.values()
+    texts = [output.expression for output in outputs]
+    found = frozenset(name for o in outputs for name in (o.late, o.corner) if name)
+    followed = frozenset[str]()
+    while texts:
+        found = found.union(*(names_reached(model, text, "model") for text in texts))
+        fresh = (found - followed) & model.states.keys()
+        followed |= fresh
+        texts = [model.states[name].derivative for name in fresh]
+    return found
+
+
 def along_measured_motion(model: Model) -> Model:
     """The model with its measured states as inputs; ports and effects are unchanged.
 

@@ -27,11 +27,14 @@ from rigwatch.physics.engine.fit.recording import (
 )
 from rigwatch.physics.engine.fit.ties import untied
 from rigwatch.physics.engine.fit.windowed_fit import (
+    CLOSE,
+    FAR,
     QUIET,
     Fit,
     Prior,
     bounds,
     covariance_of,
+    deviations,
     error_at,
     evaluate,
     fit,
@@ -39,7 +42,9 @@ from rigwatch.physics.engine.fit.windowed_fit import (
 )
 
 __all__ = [
+    "CLOSE",
     "ENOUGH",
+    "FAR",
     "QUIET",
     "EffectStates",
     "Fit",
@@ -53,6 +58,7 @@ __all__ = [
     "beginning",
     "bounds",
     "covariance_of",
+    "deviations",
     "error_at",
     "evaluate",
     "filled",

@@ -179,7 +179,7 @@ def _smallest_error(
     standard deviations small.
     """
     low, high = within
-    unit = _deviations(*problem.projected(problem.whole(begin, theta)), theta)
+    unit = deviations(*problem.projected(problem.whole(begin, theta)), theta)
 
     def parameters(moved: FloatArray) -> FloatArray:
         return problem.whole(begin, np.clip(theta + unit * (moved - FAR), low, high))
@@ -213,7 +213,7 @@ def _smallest_error(
     return np.asarray(parameters(found.x)[problem.free])
 
 
-def _deviations(residual: FloatArray, jacobian: FloatArray, theta: FloatArray) -> FloatArray:
+def deviations(residual: FloatArray, jacobian: FloatArray, theta: FloatArray) -> FloatArray:
     """Each parameter's standard deviation given the others.
 
     Its size if it has no influence, or if nothing is left to explain.

@@ -3,7 +3,7 @@
 search (ShortHorizons, WholeRuns) ──attempts──▶ multi_start_fit ──▶ Fit, Convergence
 """
 
-from rigwatch.physics.engine.search.continued_fit import fit_continued
+from rigwatch.physics.engine.search.continued_fit import begun_anew_nearby, fit_continued
 from rigwatch.physics.engine.search.convergence import (
     Convergence,
     at_other_values,
@@ -20,6 +20,7 @@ __all__ = [
     "ShortHorizons",
     "WholeRuns",
     "at_other_values",
+    "begun_anew_nearby",
     "continued_spread",
     "convergence",
     "fit_continued",

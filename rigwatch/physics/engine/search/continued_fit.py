@@ -23,7 +23,9 @@ import scipy
 
 from rigwatch.physics.engine.compile import CompiledSystem, rate_limit
 from rigwatch.physics.engine.fit import (
+    CLOSE,
     ENOUGH,
+    FAR,
     QUIET,
     Fit,
     Prior,
@@ -33,6 +35,7 @@ from rigwatch.physics.engine.fit import (
     Tangent,
     bounds,
     covariance_of,
+    deviations,
     fit,
     result_of,
 )
@@ -41,7 +44,9 @@ from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
 
 CONVERGED = 1e-6
-"""Relative fall of the squared error, and of the step, at which a fit ends."""
+"""Relative fall of the squared error at which a fit ends."""
+NEGLIGIBLE = 1e-8
+"""Change of the error by an unknown's own size, relative to the error, below which it is kept."""
 MOST = 30
 """Most evaluations of a fit."""
 
@@ -74,6 +79,29 @@ def fit_continued(
         return found
     windows = _ContinuedWindows(found, recording, horizon, substeps)
     return windows.fitted(prior) if windows.continue_anywhere else found
+
+
+@QUIET
+def begun_anew_nearby(found: Fit, recording: Recording, horizon: int, substeps: int) -> Fit:
+    """A continued fit whose `begun_anew` is the optimum nearest to its own parameters.
+
+    The one that it came from may lie in another valley, where an effect that the recording needs
+    has the wrong sign.
+
+    Args:
+        found: fitted by `fit_continued`.
+        recording, horizon, substeps: what it was fitted to.
+    """
+    if not found.continued:
+        return found
+    try:
+        near = fit(
+            found.compiled, recording, horizon, start=found.parameters, scale=found.scale,
+            initial=found.initial, substeps=substeps,
+        )  # fmt: skip
+    except ModelError:
+        return found
+    return replace(found, begun_anew=near)
 
 
 @QUIET
@@ -163,35 +191,52 @@ class _ContinuedWindows:
         return np.inf if there is None else float(np.sqrt(np.mean(there.residual**2)))
 
     def _least_squares(self, begin: FloatArray, prior: Prior | None) -> FloatArray:
-        """The unknowns of the smallest error near these."""
+        """The unknowns of the smallest error near these.
+
+        The solver's are scaled and offset as in `fit`: it moves what is within 1e-10 of a bound, in
+        whatever unit, and a compliance of oil of 1e-13 m³/Pa always is.
+        """
         low, high = self._bounds()
         size = self._problem.count
+        begin = np.clip(begin, low, high)
+        here = self._path(begin)
+        assert here is not None
+        residual, jacobian = here.residual.ravel(), here.jacobian.reshape(size, -1)
+        unit = deviations(residual, jacobian, begin)
+        # What has no influence, as a capacity that windows apart made infinite, stays.
+        told = np.linalg.norm(jacobian, axis=0) * np.abs(begin)
+        steps = unit * ((begin == 0) | (told > NEGLIGIBLE * np.linalg.norm(residual)))
 
-        def residuals(q: FloatArray) -> FloatArray:
+        def unknowns(moved: FloatArray) -> FloatArray:
+            return np.asarray(np.clip(begin + steps * (moved - FAR), low, high))
+
+        def residuals(moved: FloatArray) -> FloatArray:
+            q = unknowns(moved)
             path = self._path(q)
             own = np.full(size, np.nan) if path is None else path.residual.ravel()
             return own if prior is None else np.append(own, prior.error(q[: self._m]))
 
-        def slopes(q: FloatArray) -> FloatArray:
-            path = self._path(q)
-            own = np.zeros((size, len(q))) if path is None else path.jacobian.reshape(size, -1)
-            if prior is None:
-                return own
-            weak = np.zeros((len(prior.slopes), len(q)))
-            weak[:, : self._m] = prior.slopes
-            return np.vstack([own, weak])
+        def slopes(moved: FloatArray) -> FloatArray:
+            path = self._path(unknowns(moved))
+            own = np.zeros((size, len(steps))) if path is None else path.jacobian.reshape(size, -1)
+            if prior is not None:
+                weak = np.zeros((len(prior.slopes), len(steps)))
+                weak[:, : self._m] = prior.slopes
+                own = np.vstack([own, weak])
+            return np.asarray(own * steps)
 
         try:
             found = scipy.optimize.least_squares(
-                residuals, np.clip(begin, low, high), jac=slopes, bounds=(low, high),
-                x_scale="jac", ftol=CONVERGED, xtol=CONVERGED, max_nfev=MOST,
+                residuals, np.full(len(begin), FAR), jac=slopes,
+                bounds=(FAR + (low - begin) / unit, FAR + (high - begin) / unit),
+                x_scale="jac", ftol=CONVERGED, xtol=CLOSE / FAR, max_nfev=MOST,
             )  # fmt: skip
         except (ValueError, np.linalg.LinAlgError) as error:
             raise ModelError(
                 f"{self._problem.system.model.name}: the search diverged (NaN or infinite);"
                 " try other starting values"
             ) from error
-        return np.asarray(found.x)
+        return unknowns(found.x)
 
     def _bounds(self) -> tuple[FloatArray, FloatArray]:
         """Lower and upper bounds of the unknowns."""

@@ -10,7 +10,7 @@ none, its text says what the best set leaves, and what every equally good set ha
 names one, and a set without it leaves far less than any with it, the verdict is undetermined.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from rigwatch.workbench.compare import Bench
@@ -277,14 +277,14 @@ def _set_verdict(
     if not order or order[0].verdict.word == "unknown_effect":
         return _undetermined_by_sets(verdict, best)
     first, then = order[0], [part for part in order[1:] if part.certain]
-    row = alone[first.row.label]
+    others = tuple(each.label for each in best.rows if each.label != first.row.label)
+    row = _named_alone(first, alone)
     if row.fitted is None:
         refit(bench.study, bench.data, bench.base, row)
     if not row.accepted and first.certain:
         first = replace(first, verdict=with_similar(first.verdict, first.ranked))
     found, second = first.verdict, then[0].verdict.members if first.certain and then else ()
     left = floor_of(bench, best.fitted).left_over(bench.base.held_out, best.fitted.held_out)
-    others = tuple(each.label for each in best.rows if each.label != row.label)
     return replace(
         found,
         best=row,
@@ -293,6 +293,12 @@ def _set_verdict(
         evidence=Evidence(left, found.evidence.margin),
         beside=others,
     )
+
+
+def _named_alone(part: _Member, alone: Mapping[str, Ranked]) -> Ranked:
+    """The row without the set of what a verdict names, which may be another of the class."""
+    named = part.verdict.best
+    return alone[named.label if named is not None and named.label in alone else part.row.label]
 
 
 def _how_to_add(row: Ranked, others: Sequence[str]) -> str:
