@@ -1,13 +1,29 @@
 """The recorded topics of the bus: complete samples and numbered messages, others as received."""
 
+import time
+
 from rigwatch.recorder.positions import Positions
 from rigwatch.wire.bus import Bus, CompleteSubscription, Subscription
 from rigwatch.wire.delivery import SampleReader
-from rigwatch.wire.messages import RUN, SAMPLES, TOPICS, Event, Gap, Message, SampleBlock
+from rigwatch.wire.messages import (
+    ALARMS,
+    GAPS,
+    RECORDERS,
+    RUN,
+    SAMPLES,
+    TOPICS,
+    Event,
+    Gap,
+    Message,
+    SampleBlock,
+    is_source,
+)
 
 _SUBSCRIBED = tuple(line for line in TOPICS if line.recorded and line not in (SAMPLES, RUN))
 CATCH_UP = 0.25
 """Longest time in a turn for messages of the rings, which come a second's worth at a time [s]."""
+PROVED_WITHIN, MOST_UNPROVED = 2.0, 256
+"""Time within which the token of a process that reports a gap is known [s], and how many wait."""
 
 
 class Feed:
@@ -23,6 +39,7 @@ class Feed:
     Attributes:
         samples: samples delivered.
         gap_samples: samples reported as lost, by this reader.
+        foreign_gaps: reports in the name of daq, monitor or a recorder that were not theirs.
     """
 
     def __init__(
@@ -33,7 +50,7 @@ class Feed:
         *,
         gaps_may_fill: bool = False,
     ) -> None:
-        self.samples = self.gap_samples = 0
+        self.samples = self.gap_samples = self.foreign_gaps = 0
         self._name = bus.process
         here = not gaps_may_fill
         self._reader = SampleReader(bus, resume_after, publish_gaps=here, patient=here)
@@ -49,8 +66,16 @@ class Feed:
             for line in _SUBSCRIBED
             if line.numbered
         }
-        others = [bus.subscribe(line) for line in _SUBSCRIBED if not line.numbered]
-        self._others: list[Subscription] = [*others, *self._numbered.values()]
+        self._unproved: list[tuple[float, Gap, str]] = []
+        # Gaps last: those before show who may report some.
+        others = [
+            bus.subscribe(line) for line in _SUBSCRIBED if not (line.numbered or line is GAPS)
+        ]
+        self._others: list[Subscription] = [
+            *others,
+            *self._numbered.values(),
+            bus.subscribe(GAPS),
+        ]
 
     def take(self) -> list[Message]:
         """Messages received since the last call; does not wait."""
@@ -76,7 +101,39 @@ class Feed:
     def _drained(self, subscription: Subscription) -> list[Message]:
         if isinstance(subscription, CompleteSubscription):
             return subscription.catch_up(CATCH_UP)  # its own gaps are in their place
+        if subscription.topic is GAPS:
+            return self._credible(subscription)
         return [message for message in subscription.drain() if not self._is_own(message)]
+
+    def _credible(self, subscription: Subscription) -> list[Message]:
+        """Reports of losses by others, without those in the name of a process that is not theirs.
+
+        `rigwatch info` believes those of daq and monitor.
+        """
+        found: list[Message] = []
+        now, waiting = time.monotonic(), self._unproved
+        self._unproved = []
+        for at, gap, sender in [*waiting, *((now, *one) for one in subscription.drain_from())]:
+            if self._is_own(gap):
+                continue
+            if self._is_by(gap, sender):
+                found.append(gap)
+            elif now - at < PROVED_WITHIN and len(self._unproved) < MOST_UNPROVED:
+                self._unproved.append((at, gap, sender))
+            else:
+                self.foreign_gaps += 1
+        return found
+
+    def _is_by(self, gap: Gap, sender: str) -> bool:
+        """Whether a report comes from the process that it names, as far as that matters."""
+        if gap.reporter in RECORDERS:
+            # What another recorder lacks says nothing of this recording; a remote one has the
+            # reports of its site.
+            return self._name != RUN.publisher
+        if gap.reporter == ALARMS.publisher:
+            alarms = self._numbered[ALARMS.name]
+            return alarms.is_process(gap.reporter, sender)
+        return not is_source(gap.reporter) or self._reader.is_source(gap.boot, sender)
 
     def positions(self) -> Positions:
         """Positions in the numbered topics."""

@@ -152,6 +152,7 @@ class Recorder:
             "dropped_messages": float(self.store.dropped_messages + self.feed.dropped),
             "rejected": float(self.feed.rejected),
             "refused_messages": float(self.feed.refused),
+            "foreign_gaps": float(self.feed.foreign_gaps),
             "segments": float(self.store.segment_count),
             "free_share": -1.0 if math.isnan(share) else share,
             "disk_trouble": float(bool(self.store.failure) or self._disk.short),

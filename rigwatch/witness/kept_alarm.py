@@ -47,7 +47,7 @@ class KeptAlarm:
             _log.warning("%s: cannot be written: %s", self._path, reason_of(error))
 
 
-def beside_journal(config: RigConfig) -> KeptAlarm:
+def beside_journal(config: RigConfig) -> Path | None:
     """The file of a rig; none without an alarm journal."""
     journal = config.monitor.journal if config.monitor else ""
-    return KeptAlarm(Path(f"{journal}.stale") if journal else None)
+    return Path(f"{journal}.stale") if journal else None

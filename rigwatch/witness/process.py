@@ -36,6 +36,7 @@ from rigwatch.witness.announcer import Announcer
 from rigwatch.witness.doubles import RESTART, Doubles
 from rigwatch.witness.kept_alarm import KeptAlarm, beside_journal
 from rigwatch.witness.outputs import Outputs
+from rigwatch.witness.said_alarms import SaidAlarms
 from rigwatch.witness.silence import Silence
 from rigwatch.witness.stale_alarm import StaleAlarm
 
@@ -59,6 +60,7 @@ class Witness:
         now: monotonic time [s].
         security: section [bus.security].
         kept: keeps the witness's own alarm over restarts.
+        said: keeps what it has said for its next run.
         lease: silence after which a link to the router counts as broken [s].
 
     Raises:
@@ -74,11 +76,13 @@ class Witness:
         security: SecuritySection | None = None,
         kept: KeptAlarm | None = None,
         *,
+        said: SaidAlarms | None = None,
         lease: float = 10.0,
     ) -> None:
         self._security = security = security or SecuritySection()
         self.settings, self._bus = settings, bus
-        bus.announce()
+        self._said = said or SaidAlarms(None, None)
+        bus.announce(self._said.messages)
         self._announcer = Announcer(settings, bus.rig)
         self._outputs = Outputs(settings, bus, security)
         self._estimates = bus.subscribe_lossy(ESTIMATES)
@@ -161,6 +165,8 @@ class Witness:
         trouble = self._announcer.trouble or self._outputs.trouble
         health = Health(PROCESS, t_ns, state, trouble, counters)
         self._bus.publish(HEALTH, health)
+        if self._said.messages:
+            self._said.messages.write()  # what could not be written before
         self._outputs.renew(now, t_ns, silent, stale=stale)
 
     def close(self) -> None:
@@ -169,6 +175,7 @@ class Witness:
         self._doubles.close()
         self._alarms.close()
         self._estimates.close()
+        self._said.close()
 
 
 def patient(config: RigConfig) -> WitnessSection:
@@ -187,12 +194,15 @@ def run(config: RigConfig, stop: threading.Event) -> None:
     with joined(config, PROCESS, stop) as bus:
         if bus is None:
             return
+        path = beside_journal(config)
+        kept = KeptAlarm(path)
         witness = Witness(
             patient(config),
             bus,
             time.monotonic(),
             config.bus.security,
-            beside_journal(config),
+            kept,
+            said=SaidAlarms(path and path.with_name(f"{path.name}.said"), kept.read()),
             lease=config.bus.lease,
         )
         heartbeat = Heartbeat(PROCESS)

@@ -301,9 +301,16 @@ def test_a_killed_monitor_has_its_alarms_and_misses_no_sample(bench: Bench) -> N
     bench.kill()
     for seq in range(400, 700):
         bench.send(wave(seq, 1, 7, 0))
-    bench.alarm_states()
+    heard_before = bench.alarm_states()
+    late = bench.network.bus("bench", "late").subscribe(ALARMS)
     bench.start()
-    assert wait_until(lambda: ("disk", "unacknowledged") in bench.alarm_states(), PATIENCE)
+    told: list[tuple[str, str]] = []
+
+    def tells() -> bool:
+        told.extend((alarm.name, alarm.state) for alarm in late.drain())
+        return ("disk", "unacknowledged") in told
+
+    assert wait_until(tells, PATIENCE), "to one that has come meanwhile"
     bench.send(wave(700, 1, 7, 0))
     bench.turn_until(700)
     heard: list[EstimateBlock] = []
@@ -315,6 +322,8 @@ def test_a_killed_monitor_has_its_alarms_and_misses_no_sample(bench: Bench) -> N
     assert wait_until(all_heard, PATIENCE)
     after = concatenate(heard)
     assert (after.seq, len(after)) == (400, 301)
+    heard_since = bench.alarm_states()
+    assert [*heard_before, *heard_since].count(("disk", "unacknowledged")) == 1, "and nobody twice"
     whole = RigMonitor(MODEL).update(wave_of(701))
     assert whole is not None
     assert same(concatenate([before, after]), whole.estimates), "it knows what went before"

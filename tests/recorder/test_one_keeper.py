@@ -69,10 +69,12 @@ def test_a_second_monitor_on_a_journal_is_refused_until_the_first_has_ended(tmp_
         pytest.raises(SessionError, match=f"alarm journal: process {first.pid} keeps it already"),
     ):
         _opened(str(journal))
-    alone, kept, cursor = _opened(str(journal))
+    alone, kept, cursor, said = _opened(str(journal))
     assert alone is not None
     assert kept is not None
     assert cursor is not None
+    assert said is not None
+    said.close()
     kept.close()
     cursor.close()
     alone.give_up()

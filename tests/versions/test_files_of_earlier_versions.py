@@ -22,7 +22,7 @@ from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.session import open_session
 from tests.alarms.alarm_signals import newest
 from tools.keep_version import formats
-from tools.keep_version.keeping import CONSTANT, left_in
+from tools.keep_version.keeping import CONSTANT, SENT, left_in
 
 HERE = Path(__file__).parent
 VERSIONS = sorted(path for path in HERE.iterdir() if (path / "session.mcap").is_file())
@@ -81,6 +81,7 @@ def test_what_was_read_of_the_files_then_is_read_of_them_now(version: Path) -> N
     assert left["position"] >= 0
     assert ("recorded" in left) == (version.name > LAST_BEFORE_TOML)
     assert ("device" in left) == (version / formats.NAME).exists()
+    assert ("sent" in left) == (version / SENT).exists()
 
 
 def test_kept_files_are_small(version: Path) -> None:

@@ -23,14 +23,19 @@ from monitor.model.model_versions import Version
 from monitor.process.cursor import Cursor
 from rigwatch.archive.tables import ALARM_COLUMNS, LOSS_COLUMNS, SESSION_COLUMNS
 from rigwatch.recorder.positions import FILE, PositionFile
+from rigwatch.wire.bus import KeptMessages
+from rigwatch.wire.bus.kept_messages import BEGIN, END
 from rigwatch.wire.messages import TOPICS, encode
 from rigwatch.wire.messages.protobuf_schema import file_descriptor_set
+from rigwatch.wire.ordering import Numbered
 from rigwatch.wire.rig_config import RigConfig
 from rigwatch.wire.session import Session, open_session
 from rigwatch.wire.typed_files import as_json
 from rigwatch.workbench.study import StudyFile
 
 NAME = "formats.toml"
+SENT_HALF = 1024
+"""Size of half a file of sent alarms here; a monitor's is larger [bytes]."""
 LENGTH = 16
 """Hexadecimal digits of a digest."""
 _UNREAD = ("description", "title")
@@ -56,6 +61,7 @@ def digests(session: Path) -> dict[str, str]:
         "blocks": lambda: _encoded(open_session(session)),
         "monitor_position": _monitor_position,
         "recorder_positions": _recorder_positions,
+        "sent_alarms": _sent_alarms,
         "index": lambda: as_json([SESSION_COLUMNS, ALARM_COLUMNS, LOSS_COLUMNS]),
     }
     found = {name: digest_of(kind) for name, kind in TYPES.items()}
@@ -105,6 +111,16 @@ def _monitor_position() -> bytes:
         cursor = Cursor(path)
         cursor.write(5, 7)
         cursor.close()
+        return path.read_bytes()
+
+
+def _sent_alarms() -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "said")
+        kept = KeptMessages(path, SENT_HALF)
+        for number, payload in ((BEGIN, b"a start of the machine"), (0, b"an alarm"), (END, b"")):
+            kept.write(Numbered(5, number, payload))
+        kept.close()
         return path.read_bytes()
 
 

@@ -4,6 +4,7 @@
             positions, alarms.jsonl with its position, rigwatch-index/, formats.toml, left.toml
     two kept logs ──▶ a study of them, with an effect ──▶ tests/versions/DAY/study/
     an identity ──▶ a device as daq remembers it ──▶ tests/versions/DAY/alarms.jsonl.device
+    the session's alarms ──▶ a file of sent alarms ──▶ tests/versions/DAY/alarms.jsonl.said
 
 Of the session stay two seconds after friction was named, and the folder is renamed to /var/lib/rig.
 `left.toml` says what was read of the files when they were kept; `tests/versions` compares it with
@@ -24,7 +25,10 @@ from monitor.process.cursor import Cursor
 from rigwatch.archive import Store, index
 from rigwatch.commands import main as rigwatch
 from rigwatch.recorder import load_positions, newest
+from rigwatch.wire.bus import KeptMessages
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.messages import Alarm, decode, encode
+from rigwatch.wire.ordering import OPEN, Ask, Numbered
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.session import Session, open_session, trim
 from rigwatch.wire.session.edit import copy_messages
@@ -50,6 +54,8 @@ PLACE = "/var/lib/rig"
 AFTER, LENGTH = 256, 588
 """The part of the session that is kept: samples from the naming of friction on, and how many."""
 FRICTION = "dry_friction"
+SENT, SENT_HALF, RUN = "alarms.jsonl.said", 1 << 14, 5
+"""File of the alarms that were sent, size of its halves [bytes], and run that sent them."""
 CONSTANT = VERSIONS / "2026-11-24" / "session.mcap"
 """A recording that stays the same, for the digests of formats."""
 FILES = ("model.toml", "alarms.jsonl", "alarms.jsonl.position")
@@ -84,6 +90,7 @@ def keep(demo: Path, versions: Path) -> Path:
     (target / "rigwatch-index" / "lock").unlink(missing_ok=True)
     _keep_study(target / "study")
     KnownDevice("daq", target / "alarms.jsonl.device").admits(DEVICE)
+    _keep_sent(target)
     (target / formats.NAME).write_text(as_toml(formats.digests(CONSTANT)), "utf-8")
     (target / "left.toml").write_text(as_toml(left_in(target)), "utf-8")
     return target
@@ -94,6 +101,16 @@ def _new_folder(versions: Path, day: str) -> Path:
     target = next(path for name in names if not (path := versions / name).exists())
     target.mkdir()
     return target
+
+
+def _keep_sent(target: Path) -> None:
+    """The alarms of the session as a run that has sent them and ended leaves them."""
+    sent = KeptMessages(target / SENT, SENT_HALF)
+    sent.begin(RUN)
+    alarms = (item.message for item in open_session(target / "session.mcap").messages(["alarms"]))
+    for number, alarm in enumerate(alarms):
+        sent.write(Numbered(RUN, number, encode(alarm)))
+    sent.close()
 
 
 def _keep_study(folder: Path) -> None:
@@ -133,8 +150,8 @@ def left_in(version: Path) -> dict[str, Any]:
     Returns:
         `software` that wrote the session; its `samples` and `estimates`; `friction`, the state of
         the friction alarm in the journal; `position`, the number of the monitor's last sample;
-        `recorded`, that of the recorder's last message of estimates, and `device`, what the rig's
-        device told of itself, where they are kept.
+        `recorded`, that of the recorder's last message of estimates, `device`, what the rig's
+        device told of itself, and `sent`, the number of alarms sent, where they are kept.
     """
     session = open_session(version / "session.mcap")
     records, _ = read_journal(version / "alarms.jsonl")
@@ -144,6 +161,7 @@ def left_in(version: Path) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         # A monitor maps its own file, and may write it.
         place = Cursor(Path(copy(version / "alarms.jsonl.position", folder))).read()
+        sent = _sent(version / SENT, Path(folder))
     devices = read_devices(version / "alarms.jsonl.device")
     kept = load_positions(version).get("estimates", {}).get("monitor")
     return {
@@ -154,4 +172,13 @@ def left_in(version: Path) -> dict[str, Any]:
         "position": -1 if place is None else place[1],
         **({"recorded": kept[1]} if kept else {}),
         **({"device": devices[-1].identity} if devices else {}),
+        **({"sent": sent} if sent else {}),
     }
+
+
+def _sent(path: Path, folder: Path) -> int:
+    """How many alarms the run in a file has sent, read from a copy; 0 without a file."""
+    if not path.exists():
+        return 0
+    reply = KeptMessages(copy(path, folder), SENT_HALF).past.reply(Ask(RUN, 0, OPEN))
+    return sum(bool(decode(Alarm, one.payload).name) for one in reply.blocks)

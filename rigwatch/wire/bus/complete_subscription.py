@@ -206,6 +206,11 @@ class CompleteSubscription(Subscription):
         found = {name: peer.order.position for name, peer in self._senders.items()}
         return {name: place for name, place in found.items() if place is not None}
 
+    def is_process(self, process: str, sender: str) -> bool:
+        """Whether the identity `sender` is that of a process that is followed."""
+        peer = self._senders.get(process)
+        return peer is not None and peer.is_owner(sender)
+
     def close(self) -> None:
         """Stop receiving."""
         for close in self._closers:

@@ -70,6 +70,12 @@ class KeptMessages:
         """All messages of the earlier runs."""
         return frozenset(one.payload for run in self._runs for one in run.messages)
 
+    @property
+    def newest(self) -> bytes | None:
+        """The last message of the earlier runs; None if there is none."""
+        kept = [one.payload for run in self._runs for one in run.messages]
+        return kept[-1] if kept else None
+
     def complete(self, payloads: list[bytes] | None) -> None:
         """Add to the last earlier run what it was about to send when it was killed.
 

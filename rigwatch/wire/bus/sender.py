@@ -58,6 +58,11 @@ class Sender:
             return None
         return self.order.on_block(message)
 
+    def is_owner(self, sender: str) -> bool:
+        """Whether `sender` owns a run that lives, or has just ended."""
+        runs = [run for run in (*self._alive, *self._ended) if self._may_speak(run)]
+        return any(self._owners.owner_of(run) == sender for run in runs)
+
     def replied(self, ask: Ask, reply: RingReply[Numbered] | None) -> list[Outcome[Numbered]]:
         """Process a ring's reply, None if there was none."""
         return self.order.on_reply(ask, reply)

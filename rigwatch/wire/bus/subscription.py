@@ -35,7 +35,7 @@ class Subscription:
         self.rejected = 0
         self._capacity = capacity
         self._rates = SenderRates() if topic.rate_hz <= MOST_LIMITED else None
-        self._waiting: SimpleQueue[bytes] = SimpleQueue()
+        self._waiting: SimpleQueue[tuple[bytes, str]] = SimpleQueue()
         self._close: Close = lambda: None
 
     def __len__(self) -> int:
@@ -57,7 +57,7 @@ class Subscription:
             with contextlib.suppress(Empty):
                 self._waiting.get_nowait()
                 self.dropped += 1
-        self._waiting.put(payload)
+        self._waiting.put((payload, sender))
 
     def get(self, timeout: float | None = None) -> Any:
         """The next message of the topic's class, or None if none arrives within `timeout` [s].
@@ -65,15 +65,20 @@ class Subscription:
         Args:
             timeout: 0 does not wait, None waits indefinitely.
         """
+        found = self._next(timeout)
+        return None if found is None else found[0]
+
+    def _next(self, timeout: float | None) -> tuple[Any, str] | None:
+        """The same with the identity of its sender."""
         deadline = None if timeout is None else time.monotonic() + timeout
         while True:
             left = None if deadline is None else max(0.0, deadline - time.monotonic())
             try:
-                payload = self._waiting.get(block=left != 0.0, timeout=left)
+                payload, sender = self._waiting.get(block=left != 0.0, timeout=left)
             except Empty:
                 return None
             with contextlib.suppress(MessageError):
-                return decode(self.topic.message, payload)
+                return decode(self.topic.message, payload), sender
             self.rejected += 1
 
     def drain(self, most: int | None = None) -> list[Any]:
@@ -86,6 +91,11 @@ class Subscription:
         count = waiting if most is None else min(most, waiting)
         found = [self.get(timeout=0) for _ in range(count)]
         return [message for message in found if message is not None]
+
+    def drain_from(self) -> list[tuple[Any, str]]:
+        """The waiting messages, oldest first, each with the identity of its sender."""
+        found = [self._next(timeout=0) for _ in range(self._waiting.qsize())]
+        return [one for one in found if one is not None]
 
     def __iter__(self) -> Iterator[Any]:
         while True:

@@ -137,6 +137,17 @@ class SampleReader:
         impostor = at is not None and time.monotonic() - at < CONTESTED
         return impostor or self._order.sources.contested
 
+    def is_source(self, boot: int, sender: str) -> bool:
+        """Whether the identity `sender` may speak for a boot.
+
+        That is its owner; for a boot of which nothing was heard, the owner of the one in control.
+        """
+        in_control = self._order.sources.current
+        owner = self._owners.owner_of(boot)
+        if not owner and in_control is not None:
+            owner = self._owners.owner_of(in_control)
+        return owner == sender
+
     def silent_for(self) -> float:
         """Time since the last sample, or since the start [s]."""
         return time.monotonic() - self._heard_at

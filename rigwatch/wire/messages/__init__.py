@@ -75,6 +75,7 @@ from rigwatch.wire.messages.topics import (
     TOPICS,
     Topic,
     bus_key,
+    is_source,
     topic,
     topic_of,
 )
@@ -141,6 +142,7 @@ __all__ = [
     "decode_all",
     "decode_block",
     "encode",
+    "is_source",
     "json_fields",
     "layout_of",
     "merged",

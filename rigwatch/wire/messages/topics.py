@@ -89,6 +89,11 @@ ALIVE_KEY = "alive"
 """Liveliness tokens are at `alive/<process>`."""
 
 
+def is_source(reporter: str) -> bool:
+    """Whether a reporter names a data acquisition: "daq/rig"."""
+    return reporter.partition("/")[0] == SAMPLES.publisher
+
+
 def topic_of(message: Message) -> Topic:
     """The topic that carries messages of this class."""
     return _BY_CLASS[type(message)]

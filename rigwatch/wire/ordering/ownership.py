@@ -45,6 +45,11 @@ class Owners:
         self._owners[boot] = owner
         return owner[1] == sender
 
+    def owner_of(self, boot: int) -> str:
+        """The owner of a boot, or its last one; "" if none is known."""
+        owner = self._owner(boot)
+        return self._ended.get(boot, "") if owner is None else owner[1]
+
     def _owner(self, boot: int) -> tuple[int | None, str] | None:
         """Start of the owner's token, None without one, and the owner; None if there is none."""
         owner = self._owners.get(boot)

@@ -1,16 +1,18 @@
 """What a session lacks, each sample and message counted once.
 
 Several readers may report the same loss, and one reader's loss may be in the recording all the
-same: samples are missing if reported lost or skipped between two others, and not present.
+same: samples are missing if reported lost or skipped between two others, and not present. The
+reports of recorder, daq and monitor count: those of any other process may be made up.
 """
 
 from bisect import bisect_left
 from collections.abc import Iterable
 from itertools import pairwise
 
-from rigwatch.wire.messages import RECORDERS, Gap, SampleBlock
+from rigwatch.wire.messages import ALARMS, RECORDERS, Gap, SampleBlock, is_source
 
 Span = tuple[int, int]
+_BELIEVED = (*RECORDERS, ALARMS.publisher)
 
 
 def union(spans: Iterable[Span]) -> list[Span]:
@@ -59,6 +61,8 @@ class Losses:
             if message.reporter in RECORDERS:
                 place = message.topic, message.boot
                 self._messages.setdefault(place, []).append((message.first, message.last))
+        elif not (message.reporter in _BELIEVED or is_source(message.reporter)):
+            return
         elif message.last < message.first:
             self._open.add(message.boot)
         else:

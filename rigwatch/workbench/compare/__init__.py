@@ -2,6 +2,7 @@
 
 from rigwatch.workbench.compare.base_fit import Base
 from rigwatch.workbench.compare.base_search import Bases, find_base
+from rigwatch.workbench.compare.base_step import AT_NOISE
 from rigwatch.workbench.compare.compare import Comparison, compare, comparison
 from rigwatch.workbench.compare.decided_hold import (
     Decided,
@@ -21,6 +22,7 @@ from rigwatch.workbench.compare.unweighed import unweighed
 from rigwatch.workbench.compare.warm import Warm
 
 __all__ = [
+    "AT_NOISE",
     "Base",
     "Bases",
     "Bench",

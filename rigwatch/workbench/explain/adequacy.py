@@ -17,8 +17,7 @@ from rigwatch.physics.engine.equations import Model
 from rigwatch.physics.engine.fit import Fit
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.compare import Bench, find_base, open_bench
-from rigwatch.workbench.compare.base_step import AT_NOISE
+from rigwatch.workbench.compare import AT_NOISE, Bench, find_base, open_bench
 from rigwatch.workbench.data import METHODS, NoiseFloor, from_residual
 from rigwatch.workbench.explain.verdict import Verdict, not_converged
 from rigwatch.workbench.ranking import Progress

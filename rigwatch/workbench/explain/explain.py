@@ -107,8 +107,8 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
     """
     bench, told = first.bench, first.explanation
     unknown, rarer = told.verdict == "unknown_effect", suitable(bench.study)[1]
-    unexplained = told.exchange is None and (unknown or bool(told.remains))
-    if not unexplained or not rarer or not tries_rarer(bench.study):
+    explained = told.exchange is not None or not (unknown or told.remains)
+    if explained or not rarer or not tries_rarer(bench.study):
         return first
     wider = with_whole_library(bench.study)
     rows = rank_all(wider, bench.data, bench.base)

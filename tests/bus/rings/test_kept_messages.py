@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from rigwatch.wire.bus import kept_messages
 from rigwatch.wire.bus.kept_messages import KeptMessages
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.bus.tokens.watching import _Token
 from rigwatch.wire.messages import ALARMS, Gap
 from rigwatch.wire.ordering import (
     EMPTY,
@@ -184,6 +185,25 @@ def test_where_nothing_is_known_of_an_end_a_gap_is_reported(tmp_path: Path) -> N
     found: list[object] = []
     eventually(lambda: found.extend(listener.drain()) or bool(found), "a gap")  # type: ignore[func-returns-value]
     assert [type(one) for one in found] == [Gap]
+
+
+def test_a_listener_that_begins_as_a_process_ends_hears_the_next_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The end of a token may come before the listener's watch has its name."""
+    network = MemoryNetwork()
+    first = network.bus("r", "monitor")
+    say(first, range(1))
+    listening = network.bus("r", "listener")
+
+    def unanswered(_watch: object, _key: str, token: _Token) -> None:
+        token.due = None
+
+    monkeypatch.setattr(listening._names, "_ask", unanswered)
+    listener = listening.listen(ALARMS)
+    first.close()
+    say(network.bus("r", "monitor"), range(1, 3))
+    assert heard(listener, 2) == [1, 2]
 
 
 def test_a_run_that_may_still_live_is_asked_again_and_not_set_back() -> None:
