@@ -85,7 +85,9 @@ def with_horizon_of(study: Study, other: Study) -> Study:
     """The study with the horizon chosen for another instance of it."""
     if not other.horizon_from:
         return study
-    file = structs.replace(study.file, horizon=other.file.horizon)
+    file = structs.replace(
+        study.file, horizon=other.file.horizon, half_windows=other.file.half_windows
+    )
     return replace(study, file=file, horizon_from=other.horizon_from)
 
 
@@ -124,7 +126,8 @@ def _share_at_ends(recording: Recording, horizon: float) -> float:
 
 def _with_source(study: Study, source: str, horizon: float | None = None) -> Study:
     rounded = None if horizon is None else float(f"{horizon:.2g}")
-    file = structs.replace(study.file, horizon=rounded)
+    half = study.file.half_windows or rounded is not None
+    file = structs.replace(study.file, horizon=rounded, half_windows=half)
     return replace(study, file=file, horizon_from=source)
 
 

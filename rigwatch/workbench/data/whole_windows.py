@@ -1,14 +1,15 @@
 """Recordings in whole windows: their ends, and what follows a time of unknown inputs.
 
 A recording seldom ends where a window does. If at least half of the last window is recorded, and
-the horizon was chosen and not given, it counts: the inputs stay at their last values until its end,
-where no output counts. Less than that is left out, since a window's own initial state would take
-most of it. A horizon that the study's file gives divides its recordings as it always has.
+the study says so, it counts: the inputs stay at their last values until its end, where no output
+counts. Less than that is left out, since a window's own initial state would take most of it. A
+study says so where its horizon was chosen; others divide their recordings as they always have.
 """
 
 import numpy as np
 
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.workbench.data.prediction import predicts_along_motion
 from rigwatch.workbench.study import Study
 
 LEAST = 0.5
@@ -21,16 +22,15 @@ def counted_length(study: Study, samples: int, horizon: int) -> int:
     """Samples of a recording in whole windows; all of them for a model without windows.
 
     Args:
-        study: only windows of a free run, of a horizon that was chosen, may end after the
-            recording.
+        study: only windows of its free runs may end after the recording.
         samples: of the recording.
         horizon: samples of a window.
     """
     if not study.model.states:
         return samples
     whole = samples // horizon * horizon
-    chosen = study.horizon_from and not study.file.thin
-    if chosen and whole and samples - whole >= LEAST * horizon:
+    free = not (study.file.thin or study.model.rough or predicts_along_motion(study))
+    if study.file.half_windows and free and whole and samples - whole >= LEAST * horizon:
         return whole + horizon
     return whole
 

@@ -105,7 +105,8 @@ def keep_holds(study: Study) -> Study:
     """The study with the holds and the horizon chosen from the data written to its file."""
     chosen = {n: h for n, h in study.holds.items() if h.source not in GIVEN}
     if study.horizon_from and study_of(study.folder, study.text).file.horizon is None:
-        text = f"horizon = {study.file.horizon!r}{CHOSEN}\n" + study.text
+        half = f"half_windows = true{CHOSEN}\n" if study.file.half_windows else ""
+        text = f"horizon = {study.file.horizon!r}{CHOSEN}\n{half}" + study.text
         study = replace(study_of(study.folder, text), holds=study.holds)
     if not chosen or study.file.hold:
         return study

@@ -91,6 +91,13 @@ class StudyFile(Section, frozen=True, kw_only=True):
             " time constants if not given"
         ),
     ] = None
+    half_windows: Annotated[
+        bool,
+        Meta(
+            description="whether the end of a recording counts that fills at least half of a"
+            " horizon; so it does where the horizon is chosen"
+        ),
+    ] = False
     prediction: Annotated[
         Literal["auto", "measured motion", "free"],
         Meta(

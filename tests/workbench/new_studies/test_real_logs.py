@@ -12,8 +12,8 @@ from rigwatch.workbench.data import prepare
 from rigwatch.workbench.explain.explain import explain, ranking
 from rigwatch.workbench.explain.verdict_calibration import cases_seen_logged, most_probably_wrong
 from rigwatch.workbench.report.text_report import doubt_of
-from rigwatch.workbench.steps import Logs, study_from_logs
-from rigwatch.workbench.study import Study
+from rigwatch.workbench.steps import Logs, add, study_from_logs
+from rigwatch.workbench.study import Study, open_study
 from sim_plant.machines import MACHINES, log, strength_for
 from sim_plant.machines.loggers import logged
 
@@ -53,6 +53,16 @@ def test_half_of_a_window_at_the_end_of_a_recording_counts(tmp_path: Path) -> No
     assert np.isfinite(data.train.outputs).sum() == 2400
     assert (data.train.inputs[2400:] == data.train.inputs[2399]).all()
     assert not any("not counted" in remark for remark in data.remarks)
+
+
+def test_the_ends_that_count_are_those_of_the_first_step_after_it_too(tmp_path: Path) -> None:
+    study = made(tmp_path, "motor", 0.005, 1004, saturation=0.1)
+    first = open_bench(study).data
+    assert len(first.train) > np.isfinite(first.train.outputs).sum()
+    assert add(study, "saturation", "drive").step == "add"
+    later = open_bench(open_study(study.folder)).data
+    assert later.horizon == first.horizon
+    np.testing.assert_array_equal(later.train.outputs, first.train.outputs)
 
 
 def test_less_than_half_a_window_is_left_out_and_told(tmp_path: Path) -> None:
@@ -97,5 +107,4 @@ def made(
 
 
 def _with_horizon(study: Study, seconds: float) -> Study:
-    file = structs.replace(study.file, horizon=seconds)
-    return replace(study, file=file, horizon_from="the test")
+    return replace(study, file=structs.replace(study.file, horizon=seconds, half_windows=True))
