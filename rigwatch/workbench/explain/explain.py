@@ -103,15 +103,16 @@ def explained(bench: Bench, progress: Progress = no_progress) -> Explained:
 def _with_rarer(first: Explained, progress: Progress) -> Explained:
     """The explanation; by the whole library if no usual effect explains the error.
 
-    An effect that is named although much is left may be the likeness of a rarer one, as friction is
-    of friction behind a gap: it gives way to one that leaves nothing. Effects are fitted again only
-    if the score of a rarer one, corrected for the number of all, is more than chance. Where a
-    healthy recording checks a model along its measured motion, rarer ones are tried as refinements
-    already, and fits take long.
+    An effect that is named although it leaves more than noise may be the likeness of a rarer one,
+    as friction is of friction behind a gap. What is found has to leave nothing and, in place of an
+    effect that is named, half its error at most. Effects are fitted again only if the score of a
+    rarer one, corrected for the number of all, is more than chance. Where a healthy recording
+    checks a model along its measured motion, rarer ones are tried as refinements already, and fits
+    take long.
     """
     bench, told = first.bench, first.explanation
-    unknown, rarer = told.verdict == "unknown_effect", suitable(bench.study)[1]
-    explained = told.exchange is not None or not (unknown or told.remains)
+    rarer = suitable(bench.study)[1]
+    explained = told.exchange is not None or not _leaves_more_than_noise(first)
     if explained or not rarer or not tries_rarer(bench.study):
         return first
     wider = with_whole_library(bench.study)
@@ -121,12 +122,29 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
     progress(f"no usual effect explains the error: trying {len(rarer)} rarer ones")
     second = _explained_once(replace(bench, study=wider), progress)
     found = second.explanation
-    if found.verdict not in STRENGTH_TOLD or (found.remains and not unknown):
+    if found.verdict not in STRENGTH_TOLD or found.remains or not _halves(first, second):
         return _unless_named(first, f"nor does one of {len(rarer)} rarer ones")
     text = RARER.format(text=found.text, count=len(rarer))
     unlike = "; ".join([*filter(None, [found.unlike]), SECOND_PASS])
     doubted = replace(found, text=text, unlike=unlike, wrong_probability=None, wrong_at_most=None)
     return replace(second, explanation=doubted)
+
+
+def _leaves_more_than_noise(found: Explained) -> bool:
+    """Whether no effect is found, or the one that is named alone is not down to the noise floor."""
+    told, bench, best = found.explanation, found.bench, found.rows[0] if found.rows else None
+    if told.verdict not in STRENGTH_TOLD:
+        return told.verdict == "unknown_effect"
+    if told.beside or told.also or best is None or best.fitted is None:
+        return False
+    return not own_floor(bench.study, bench.data, bench.floor, best).reached(best.fitted.held_out)
+
+
+def _halves(first: Explained, second: Explained) -> bool:
+    """Whether what is named leaves at most half the error of what was named before, if any was."""
+    if first.explanation.verdict not in STRENGTH_TOLD or second.explanation.beside:
+        return True
+    return second.rows[0].held_out_error <= first.rows[0].held_out_error / 2
 
 
 def tries_rarer(study: Study) -> bool:
