@@ -103,16 +103,15 @@ def explained(bench: Bench, progress: Progress = no_progress) -> Explained:
 def _with_rarer(first: Explained, progress: Progress) -> Explained:
     """The explanation; by the whole library if no usual effect explains the error.
 
-    An effect that is named although it leaves more than noise may be the likeness of a rarer one,
-    as friction is of friction behind a gap. What is found has to leave nothing and, in place of an
-    effect that is named, half its error at most. Effects are fitted again only if the score of a
-    rarer one, corrected for the number of all, is more than chance. Where a healthy recording
-    checks a model along its measured motion, rarer ones are tried as refinements already, and fits
-    take long.
+    An effect that is named although it leaves much may be the likeness of a rarer one, as friction
+    is of friction behind a gap. What is found has to leave nothing and, in place of an effect that
+    is named, half its error at most. Effects are fitted again only if the score of a rarer one,
+    corrected for the number of all, is more than chance. Where a healthy recording checks a model
+    along its measured motion, rarer ones are tried as refinements already, and fits take long.
     """
     bench, told = first.bench, first.explanation
     rarer = suitable(bench.study)[1]
-    explained = told.exchange is not None or not _leaves_more_than_noise(first)
+    explained = told.exchange is not None or not _asks_for_rarer(first)
     if explained or not rarer or not tries_rarer(bench.study):
         return first
     wider = with_whole_library(bench.study)
@@ -130,13 +129,16 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
     return replace(second, explanation=doubted)
 
 
-def _leaves_more_than_noise(found: Explained) -> bool:
-    """Whether no effect is found, or the one that is named alone is not down to the noise floor."""
+def _asks_for_rarer(found: Explained) -> bool:
+    """Whether no effect is found, or what is named leaves much.
+
+    Fits of a model without states are quick, so that there more than noise is enough.
+    """
     told, bench, best = found.explanation, found.bench, found.rows[0] if found.rows else None
     if told.verdict not in STRENGTH_TOLD:
         return told.verdict == "unknown_effect"
-    if told.beside or told.also or best is None or best.fitted is None:
-        return False
+    if told.beside or told.also or best is None or best.fitted is None or bench.study.model.states:
+        return told.remains > 0.0
     return not own_floor(bench.study, bench.data, bench.floor, best).reached(best.fitted.held_out)
 
 
