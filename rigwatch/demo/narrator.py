@@ -42,8 +42,13 @@ OF_THE_RIG = (NAMELESS, "dry_friction", "stiction", "other_fault")
 
 @dataclass(frozen=True, slots=True)
 class Act:
-    """A change to the simulated rig: its sample, whether a fault begins with it, a description, and
-    how often the scenario has been played before.
+    """A change to the simulated rig.
+
+    Attributes:
+        seq: its sample.
+        begins: whether a fault begins with it.
+        text: a description.
+        played: how often the scenario has been played before.
     """
 
     seq: int

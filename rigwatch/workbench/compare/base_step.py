@@ -122,7 +122,7 @@ class BaseSearch:
         """
         own, begun = _labels(study), _labels(at.study)
         within = [one for one in self._briefs if begun != _labels(one.study) < own]
-        simpler = min(within, key=lambda one: one.error, default=None)
+        simpler = min(within, key=_error, default=None)
         if simpler is None or (found and not self._is_worse(found.error, simpler.error)):
             return found
         again = self._or_none(brief_fit, simpler.study, simpler.fit, study)

@@ -19,7 +19,7 @@ from rigwatch.workbench.data import RESAMPLED
 from rigwatch.workbench.explain.remaining_error import LITTLE
 from rigwatch.workbench.explain.verdict import Verdict, judge
 from rigwatch.workbench.ranking import Ranked
-from rigwatch.workbench.study import Refusals
+from rigwatch.workbench.study import Refusals, refused_as
 
 STRONGER = 3.0
 """Smallest ratio of an effect's strength to its apparent strength on the healthy recording."""
@@ -38,7 +38,7 @@ def credible_verdict(bench: Bench, rows: list[Ranked], refused: Refusals) -> Ver
         refused: what `add` refused in the study's present state.
     """
     for row in rows:
-        if row.accepted and (reason := refused.get((row.label,))) is not None:
+        if row.accepted and (reason := refused.get(refused_as(row.label, ()))) is not None:
             row.accepted, row.reason = False, f"as `add` found: {reason}"
     verdict = judge(bench.base, rows, bench.floor)
     while verdict.best is not None and apparent_when_healthy(bench, verdict.best):
@@ -52,7 +52,7 @@ def unless_refused(refused: Refusals, verdict: Verdict) -> Verdict:
     """The verdict; `unknown_effect` if `add` refused the set in which it names an effect."""
     if verdict.word != "missing_effect" or verdict.best is None:
         return verdict
-    reason = refused.get((verdict.best.label, *sorted(verdict.beside)))
+    reason = refused.get(refused_as(verdict.best.label, verdict.beside))
     if reason is None:
         return verdict
     text = f"{verdict.text}; but `add` found: {reason}"
@@ -81,7 +81,7 @@ def still_holds(word: str, label: str, beside: Sequence[str], refused: Refusals)
         beside: the others of its set.
         refused: what `add` refused in the study's present state.
     """
-    return word != "missing_effect" or (label, *sorted(beside)) not in refused
+    return word != "missing_effect" or refused_as(label, beside) not in refused
 
 
 def apparent_when_healthy(bench: Bench, row: Ranked) -> bool:

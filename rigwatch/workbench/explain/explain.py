@@ -111,8 +111,8 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
     """
     bench, told = first.bench, first.explanation
     rarer = suitable(bench.study)[1]
-    explained = told.exchange is not None or not _asks_for_rarer(first)
-    if explained or not rarer or not tries_rarer(bench.study):
+    asked = told.exchange is None and _asks_for_rarer(first)
+    if not (asked and rarer and tries_rarer(bench.study)):
         return first
     wider = with_whole_library(bench.study)
     rows = rank_all(wider, bench.data, bench.base)

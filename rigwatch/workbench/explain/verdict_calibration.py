@@ -132,9 +132,7 @@ def cases_seen_along(word: str, *, rough: bool) -> tuple[int, int]:
 
 
 def cases_seen_logged(word: str) -> tuple[int, int]:
-    """Number of first verdicts with the same word on logs with lost rows, uneven times or other
-    clocks, and how many were wrong.
-    """
+    """Number of the same first verdicts on logs of real loggers, and how many were wrong."""
     return _logged_counts().get(word, (0, 0))
 
 

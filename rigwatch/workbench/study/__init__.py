@@ -16,7 +16,13 @@ from rigwatch.workbench.study.known_values import assumed_values
 from rigwatch.workbench.study.ledger import append, check_data, commit, lines, model_hash, stands_on
 from rigwatch.workbench.study.moving_parameters import judged_alone
 from rigwatch.workbench.study.recording_parameters import Known
-from rigwatch.workbench.study.refusals import REFUSED, Refusals, refusal, refusals
+from rigwatch.workbench.study.refusals import (
+    REFUSED,
+    Refusals,
+    refusal,
+    refusals,
+    refused_as,
+)
 from rigwatch.workbench.study.study import (
     GIVEN,
     HEALTHY,
@@ -70,6 +76,7 @@ __all__ = [
     "physics_of",
     "refusal",
     "refusals",
+    "refused_as",
     "stands_on",
     "start_study",
     "study_of",

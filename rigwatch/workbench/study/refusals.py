@@ -20,6 +20,11 @@ REFUSED = "refused"
 """The ledger's name of such a step."""
 
 
+def refused_as(label: str, others: Sequence[str]) -> tuple[str, ...]:
+    """The key of a refusal: an effect, as "effect@port", and the others of its set."""
+    return label, *sorted(others)
+
+
 def refusal(study: Study, others: Sequence[str]) -> dict[str, Any]:
     """What the ledger keeps of a refusal beside its numbers.
 
@@ -47,7 +52,7 @@ def refusals(study: Study) -> dict[tuple[str, ...], str]:
     for line in refused:
         if line["opened"] == now:
             label, reason = f"{line['effect']}@{line['port']}", line["reason"]
-            found |= {(label,): reason, (label, *line["with"]): reason}
+            found |= {refused_as(label, others): reason for others in ((), line["with"])}
     return found
 
 

@@ -1,5 +1,6 @@
 """Parameters that the model fits per recording: a table whose tilt differs between recordings."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +9,9 @@ import pytest
 from rigwatch.wire.errors import ConfigError, ModelError
 from rigwatch.workbench.compare import open_bench
 from rigwatch.workbench.explain.explain import explain
-from rigwatch.workbench.study import open_study
+from rigwatch.workbench.study import Study, open_study
 from rigwatch.workbench.study.creation import create
-from tests.workbench.machine import recorded
+from tests.workbench.machine import Table, recorded
 
 SLED = """
 name = "sled"
@@ -129,14 +130,20 @@ def stroked(seed: int, zero: float) -> dict[str, np.ndarray]:
     return {"v": v, "force": force + 0.02 * generator.normal(size=len(v))}
 
 
-def test_a_model_without_states_may_move_too(tmp_path: Path) -> None:
-    (tmp_path / "model.toml").write_text(DAMPER)
-    text = 'model = "model.toml"\n'
-    for seed, (name, zero) in enumerate(TILTS.items()):
-        recorded(tmp_path / f"{name}.mcap", stroked(seed, zero), {"v": "m/s", "force": "N"})
+def damper(folder: Path, table: Callable[..., Table], names: str = "abcd", keys: str = "") -> Study:
+    """The study of a damper whose load cell's zero moves; b and d are held out."""
+    (folder / "model.toml").write_text(DAMPER)
+    text = f'model = "model.toml"\n{keys}'
+    for seed, name in enumerate(names):
+        log = table(seed, TILTS[name])
+        recorded(folder / f"{name}.mcap", log, {"v": "m/s", "force": "N"})
         text += f'[[{"held_out" if name in "bd" else "train"}]]\nsession = "{name}.mcap"\n'
-    (tmp_path / "template.toml").write_text(text)
-    found = explain(create(tmp_path / "study", tmp_path / "template.toml"))
+    (folder / "template.toml").write_text(text)
+    return create(folder / "study", folder / "template.toml")
+
+
+def test_a_model_without_states_may_move_too(tmp_path: Path) -> None:
+    found = explain(damper(tmp_path, stroked))
     assert (found.verdict, found.ranking[0].effect) == ("missing_effect", "coulomb")
     assert found.ranking[0].held_out_error < 0.03
 
@@ -152,14 +159,8 @@ def slid(seed: int, zero: float) -> dict[str, np.ndarray]:
 
 
 def test_an_effect_with_memory_is_fitted_where_a_zero_moves(tmp_path: Path) -> None:
-    """Its states run through whole recordings, and through the opening of one held out."""
-    (tmp_path / "model.toml").write_text(DAMPER)
-    text = 'model = "model.toml"\n[thin]\nfactor = 7\nedge = 15\n'
-    for seed, (name, zero) in enumerate(TILTS.items()):
-        recorded(tmp_path / f"{name}.mcap", slid(seed, zero), {"v": "m/s", "force": "N"})
-        text += f'[[{"held_out" if name in "bd" else "train"}]]\nsession = "{name}.mcap"\n'
-    (tmp_path / "template.toml").write_text(text)
-    found = explain(create(tmp_path / "study", tmp_path / "template.toml"))
+    """Its states run through whole recordings, and through the opening of the one held out."""
+    found = explain(damper(tmp_path, slid, "acb", "[thin]\nfactor = 7\nedge = 15\n"))
     assert found.verdict == "missing_effect"
     assert found.ranking[0].effect in {"jenkins", "bouc_wen"}, "sharp, they are one law"
     assert found.ranking[0].held_out_error < 0.03

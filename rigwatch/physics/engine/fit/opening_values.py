@@ -25,7 +25,7 @@ def with_opening_values(
         found: the fit.
         model: of the study.
         openings: the first parts of held-out recordings; None if no parameter depends on them.
-        horizon: samples of a window; of a model without states each recording is one.
+        horizon: samples of a window.
         substeps: Runge-Kutta steps between samples for non-stiff systems.
 
     Raises:
@@ -37,9 +37,8 @@ def with_opening_values(
     system = found.compiled.system
     loose = {n: structs.replace(p, fixed=n not in own) for n, p in system.parameters.items()}
     compiled = compile_system(replace(system, parameters=loose))
-    length = horizon if model.states else len(openings)
     at = fit(
-        compiled, openings, length, start=found.parameters, scale=found.scale, substeps=substeps
+        compiled, openings, horizon, start=found.parameters, scale=found.scale, substeps=substeps
     )
     parameters = np.where([n in own for n in system.parameters], at.parameters, found.parameters)
     return replace(found, parameters=parameters)

@@ -124,11 +124,11 @@ def beginning(recording: Recording, samples: int) -> Recording:
 def cut_for(system: System, recording: Recording, horizon: int, *, apart: bool = False) -> Windows:
     """`windows`, or one per recording if requested or if only effects have states.
 
-    Effect states do not carry over from one recording to the next.
+    Effect states do not carry over from one recording to the next, and run through all of it.
     """
-    parts = recording.parts
-    if len(parts) < 2 or not (apart or (system.states and not system.model.states)):
-        return windows(system, len(recording), horizon)
+    parts, only_effects = recording.parts, bool(system.states and not system.model.states)
+    if len(parts) < 2 or not (apart or only_effects):
+        return windows(system, len(recording), len(recording) if only_effects else horizon)
     starts = np.cumsum([0, *parts[:-1]]).astype(np.int64)
     return Windows(starts, max(parts), parts)
 
