@@ -8,6 +8,7 @@ from rigwatch.physics.engine.search.convergence import (
     Convergence,
     at_other_values,
     convergence,
+    undetermined,
 )
 from rigwatch.physics.engine.search.hidden_states import continued_spread, has_hidden_states
 from rigwatch.physics.engine.search.multi_start_fit import multi_start_fit
@@ -27,4 +28,5 @@ __all__ = [
     "has_hidden_states",
     "kept_promise",
     "multi_start_fit",
+    "undetermined",
 ]
