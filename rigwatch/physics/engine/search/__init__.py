@@ -3,7 +3,11 @@
 search (ShortHorizons, WholeRuns) ──attempts──▶ multi_start_fit ──▶ Fit, Convergence
 """
 
-from rigwatch.physics.engine.search.continued_fit import begun_anew_nearby, fit_continued
+from rigwatch.physics.engine.search.continued_fit import (
+    begun_anew_nearby,
+    fit_continued,
+    fit_nearby,
+)
 from rigwatch.physics.engine.search.convergence import (
     Convergence,
     at_other_values,
@@ -25,6 +29,7 @@ __all__ = [
     "continued_spread",
     "convergence",
     "fit_continued",
+    "fit_nearby",
     "has_hidden_states",
     "kept_promise",
     "multi_start_fit",

@@ -82,6 +82,28 @@ def fit_continued(
 
 
 @QUIET
+def fit_nearby(found: Fit, prior: Prior, recording: Recording, horizon: int, substeps: int) -> Fit:
+    """A fit by `fit_continued`, moved to where a prior and the recording agree best.
+
+    It starts where the fit ended, and keeps its `begun_anew`.
+
+    Args:
+        found: fitted by `fit_continued`.
+        prior: as in `fit`.
+        recording, horizon, substeps: what it was fitted to.
+
+    Raises:
+        ModelError: the model diverges.
+    """
+    if found.continued:
+        return _ContinuedWindows(found, recording, horizon, substeps).fitted(prior)
+    return fit(
+        found.compiled, recording, horizon, start=found.parameters, scale=found.scale,
+        initial=found.initial, substeps=substeps, prior=prior,
+    )  # fmt: skip
+
+
+@QUIET
 def begun_anew_nearby(found: Fit, recording: Recording, horizon: int, substeps: int) -> Fit:
     """A continued fit whose `begun_anew` is the optimum nearest to its own parameters.
 
@@ -365,7 +387,7 @@ class _ContinuedWindows:
             covariance=covariance_of(jacobian, variance),
             error=residual.reshape(path.residual.shape),
             jacobian=jacobian.reshape(*path.residual.shape, m),
-            begun_anew=self._found,
+            begun_anew=self._found.begun_anew or self._found,
         )
 
 
