@@ -296,10 +296,14 @@ def _settled(study: Study, data: Data, found: Fit, horizon: int, substeps: int) 
     for placement in system.placements:
         strength = placement.effect.strength
         centre[placement.prefix + strength] = placement.effect.parameters[strength].neutral
-    to = {"recording": data.train, "horizon": horizon, "substeps": substeps}
-    judged = partial(_continued_error, **to) if has_hidden_states(system) else None
-    resolved_fit = untied(found, centre, partial(fit_nearby, **to), judged)
-    return found if resolved_fit is found else begun_anew_nearby(resolved_fit, **to)
+    fitted_to = data.train, horizon, substeps
+    untied_fit = untied(
+        found,
+        centre,
+        lambda at, prior: fit_nearby(at, prior, *fitted_to),
+        (lambda at: _continued_error(at, *fitted_to)) if has_hidden_states(system) else None,
+    )
+    return found if untied_fit is found else begun_anew_nearby(untied_fit, *fitted_to)
 
 
 def _continued_error(found: Fit, recording: Recording, horizon: int, substeps: int) -> float:
