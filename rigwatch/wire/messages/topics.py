@@ -29,8 +29,8 @@ class Topic:
         recorded: whether the recorder keeps it.
         numbered: whether its publisher numbers and stores its messages, so that a listener gets
             each message once or a report of the missing ones.
-        owned_by: processes whose messages decide alarms: each has a key of its own, at which no
-            other role may send.
+        owned_by: processes whose messages decide alarms, or what a recording lacks: each has a key
+            of its own, at which no other role may send.
     """
 
     name: str
@@ -58,7 +58,7 @@ ESTIMATES = Topic(
 )
 ALARMS = Topic("alarms", "monitor/alarms", Alarm, "monitor", 0.0, recorded=True, numbered=True)
 COMMANDS = Topic("commands", "monitor/commands", AlarmCommand, "operator", 0.0, recorded=True)
-GAPS = Topic("gaps", "gaps", Gap, "any", 0.0, recorded=True)
+GAPS = Topic("gaps", "gaps", Gap, "any", 0.0, recorded=True, owned_by=("recorder",))
 HEALTH = Topic("health", "health", Health, "any", 1.0, recorded=True, owned_by=("daq", "recorder"))
 EVENTS = Topic("events", "events", Event, "any", 0.0, recorded=True)
 RUN = Topic("run", "run", RunInfo, "recorder", 0.0, recorded=True)
