@@ -12,6 +12,7 @@ place of old ones: by size at first, by age once enough of them are old. The jou
 earlier years.
 """
 
+import contextlib
 import os
 import shutil
 import sys
@@ -123,13 +124,12 @@ class Year:
 
 
 def _folder_bytes(folder: Path) -> int:
-    """Size of all files in a folder [bytes]."""
+    """Size of all files in a folder [bytes]; files and folders may be removed meanwhile."""
     total = 0
-    for path in folder.rglob("*"):
-        try:
-            total += path.stat().st_size if path.is_file() else 0
-        except OSError:
-            continue  # removed meanwhile
+    for within, _, names in os.walk(folder):
+        for name in names:
+            with contextlib.suppress(OSError):
+                total += Path(within, name).stat().st_size
     return total
 
 
