@@ -31,8 +31,8 @@ class Topic:
             each message once or a report of the missing ones.
         joined: whether a process of several rigs sends its messages as one with those of its other
             rigs, to such processes: they are many.
-        owned_by: processes whose messages decide alarms: each has a key of its own, at which no
-            other role may send.
+        owned_by: processes whose messages decide alarms, or what a recording lacks: each has a key
+            of its own, at which no other role may send.
     """
 
     name: str
@@ -62,7 +62,7 @@ ESTIMATES = Topic(
 )  # fmt: skip
 ALARMS = Topic("alarms", "monitor/alarms", Alarm, "monitor", 0.0, recorded=True, numbered=True)
 COMMANDS = Topic("commands", "monitor/commands", AlarmCommand, "operator", 0.0, recorded=True)
-GAPS = Topic("gaps", "gaps", Gap, "any", 0.0, recorded=True)
+GAPS = Topic("gaps", "gaps", Gap, "any", 0.0, recorded=True, owned_by=("recorder",))
 HEALTH = Topic("health", "health", Health, "any", 1.0, recorded=True, owned_by=("daq", "recorder"))
 EVENTS = Topic("events", "events", Event, "any", 0.0, recorded=True)
 RUN = Topic("run", "run", RunInfo, "recorder", 0.0, recorded=True)
