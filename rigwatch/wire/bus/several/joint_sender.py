@@ -11,8 +11,8 @@ from rigwatch.wire.bus.several.burst import Burst
 from rigwatch.wire.bus.several.joint_message import MOST_PARTS, Part, join, size_of
 
 LARGEST = 48 << 10
-"""Size up to which messages are joined [bytes]: within one batch of Zenoh's, so that a link that is
-full drops no more for want of room than a message of one rig."""
+"""Size up to which messages are joined [bytes]: Zenoh sends more than 64 kB in parts, and loses all
+with one of them."""
 ALONE = "alone"
 
 
