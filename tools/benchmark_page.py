@@ -27,6 +27,7 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
             "false_alarms",
             "other_faults",
             "unseen_faults",
+            "wrong_drives",
             "aperiodic",
             "detectors",
             "probable_cause",

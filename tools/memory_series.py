@@ -4,6 +4,7 @@ import csv
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,29 +23,63 @@ STEP_KB, BESIDE = 400.0, 5
 """Least rise called a step [kB], and the looks on either side whose medians differ by it."""
 
 
+PARTS = 10
+"""Parts of a series whose rises are compared with each other."""
+
+
+class Growth(NamedTuple):
+    """Growth of a process's memory over some looks.
+
+    Attributes:
+        percent: by a straight line over them [%].
+        unsure: two standard errors of it, from how much the rises between its parts differ: memory
+            grows by steps, and the same process again would make them at other times [%].
+        mb: memory at their end [MB].
+        looks: their number.
+        hours: from the first to the last of them [h].
+    """
+
+    percent: float
+    unsure: float
+    mb: float
+    looks: int
+    hours: float
+
+    @property
+    def an_hour(self) -> float:
+        """The growth of an hour [%]."""
+        return self.percent / self.hours if self.hours else float("nan")
+
+
 @dataclass
 class Memory:
-    """Memory of processes, by name, after each session: (pid, kB)."""
+    """Memory of processes, by name, after each session.
+
+    Attributes:
+        seen: of each process (pid, kB) at each look.
+        at_s: time of each look [s].
+    """
 
     seen: dict[str, list[tuple[int, float]]] = field(default_factory=dict)
+    at_s: list[float] = field(default_factory=list)
 
-    def look(self, pids: Mapping[str, int]) -> None:
-        """Note the memory of each process."""
+    def look(self, pids: Mapping[str, int], at_s: float) -> None:
+        """Note the memory of each process at a time [s]."""
+        self.at_s.append(at_s)
         for name, pid in pids.items():
             self.seen.setdefault(name, []).append((pid, memory_kb(pid)))
 
-    def growth(self, name: str, share: float = 0.5) -> tuple[float, float, int]:
-        """Growth of the last process of that name over the last `share` of all looks.
-
-        Returns:
-            growth [%] by a straight line over those looks, memory at their end [MB], their number.
-        """
+    def growth(self, name: str, share: float = 0.5) -> Growth:
+        """Growth of the last process of that name over the last `share` of all looks."""
         looks = self.seen[name]
         late = _of_last(looks[int(len(looks) * (1.0 - share)) :])
+        unknown = float("nan")
         if len(late) < 4:
-            return float("nan"), late[-1] / 1e3 if late else float("nan"), len(late)
+            return Growth(unknown, unknown, late[-1] / 1e3 if late else unknown, len(late), unknown)
         slope, level = np.polyfit(np.arange(len(late)), late, 1)
-        return float(100.0 * slope * len(late) / level), late[-1] / 1e3, len(late)
+        percent = 100.0 * slope * len(late) / level
+        hours = (self.at_s[-1] - self.at_s[-len(late)]) / 3600.0
+        return Growth(float(percent), _unsure(late, level), late[-1] / 1e3, len(late), hours)
 
     def steps(self, name: str) -> list[tuple[int, float]]:
         """Rises that stay, of the last process of that name: (look, kB), the first look is 0.
@@ -70,6 +105,15 @@ class Memory:
             table.writerow(["session", "process", "pid", "kb"])
             for name, looks in self.seen.items():
                 table.writerows([i, name, pid, kb] for i, (pid, kb) in enumerate(looks))
+
+
+def _unsure(kb: list[float], level: float) -> float:
+    """Two standard errors of the growth over a series [%]; NaN if it is too short."""
+    if len(kb) < 2 * PARTS:
+        return float("nan")
+    rises = np.diff([part.mean() for part in np.array_split(np.array(kb), PARTS)])
+    error = PARTS * np.std(rises, ddof=1) / np.sqrt(len(rises))
+    return float(200.0 * error / level)
 
 
 def _of_last(looks: Iterable[tuple[int, float]]) -> list[float]:

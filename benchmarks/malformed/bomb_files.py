@@ -11,6 +11,7 @@ import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
 import zstandard
 
+from benchmarks.malformed.records import chunk_of, record_of
 from rigwatch.wire.bus import MAX_PAYLOAD
 from rigwatch.wire.session.chunks import MAGIC
 
@@ -42,40 +43,29 @@ def bombs(chance: random.Random, session: bytes) -> dict[str, list[Bomb]]:
     }
 
 
-def _record(opcode: int, body: bytes) -> bytes:
-    return struct.pack("<BQ", opcode, len(body)) + body
-
-
-def _chunk(records: bytes, packed: bytes, kind: bytes, size: int | None = None) -> bytes:
-    claimed = len(records) if size is None else size
-    head = struct.pack("<QQQI", 0, 1, claimed, zlib.crc32(records))
-    body = head + struct.pack("<I", len(kind)) + kind + struct.pack("<Q", len(packed)) + packed
-    return _record(6, body)
-
-
 def _sessions(size: int, other: int, many: int, session: bytes) -> list[Bomb]:
     begun = session[: -len(MAGIC)]
 
     def zstd(length: int, claimed: int | None = None) -> bytes:
         records = bytes(length)
-        return _chunk(records, zstandard.compress(records), b"zstd", claimed)
+        return chunk_of(records, zstandard.compress(records), b"zstd", claimed)
 
     def lz4_of(length: int, claimed: int | None = None) -> bytes:
         records = bytes(length)
-        return _chunk(records, lz4.frame.compress(records), b"lz4", claimed)
+        return chunk_of(records, lz4.frame.compress(records), b"lz4", claimed)
 
     def small_records() -> bytes:
-        records = _record(0x7F, b"") * many
-        return _chunk(records, zstandard.compress(records), b"zstd")
+        records = record_of(0x7F, b"") * many
+        return chunk_of(records, zstandard.compress(records), b"zstd")
 
     def others(records: bytes) -> bytes:
         """An intact session, and forty chunks of what is no message of rigwatch."""
-        channel = _record(4, struct.pack("<HHI6sI4sI", 77, 0, 6, b"camera", 4, b"json", 0))
+        channel = record_of(4, struct.pack("<HHI6sI4sI", 77, 0, 6, b"camera", 4, b"json", 0))
         records = channel + records * ((60 * MB) // len(records))
-        return begun + _chunk(records, zstandard.compress(records), b"zstd") * 40 + MAGIC
+        return begun + chunk_of(records, zstandard.compress(records), b"zstd") * 40 + MAGIC
 
-    message = _record(5, struct.pack("<HIQQ", 77, 0, 0, 0))
-    declared = _record(3, struct.pack("<HI5sI4sI", 9, 5, b"Image", 4, b"json", 0))
+    message = record_of(5, struct.pack("<HIQQ", 77, 0, 0, 0))
+    declared = record_of(3, struct.pack("<HI5sI4sI", 9, 5, b"Image", 4, b"json", 0))
     return [
         ("unpacks to much", lambda: MAGIC + zstd(size) + MAGIC),
         ("unpacks to much by lz4", lambda: MAGIC + lz4_of(other) + MAGIC),

@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from benchmarks.malformed.bomb_files import MB, Bomb, bombs
-from benchmarks.malformed.fuzzing import SESSION_SAMPLES, intact_session
+from benchmarks.malformed.recordings import SESSION_SAMPLES, intact_session
 from benchmarks.malformed.tables import MAPPING
 from rigwatch.wire.errors import MessageError, RigwatchError, SessionError
 from rigwatch.wire.exchange import import_file

@@ -3,6 +3,7 @@
     devices (serial lines) ─▶ daq ─▶ router ─▶ monitor ─▶ router ─▶ subscriber
                                        └─────────┴─▶ recorder ─▶ sessions
 
+The subscriber is one process for all rigs, as a recorder is.
 `rigwatch up` of overlays over one base runs one process each for all rigs. Times are of the
 processor, read from the processes. `python -m benchmarks.processes.many_rigs_chain RIGS… SECONDS`
 runs it with other numbers.
@@ -27,7 +28,7 @@ import psutil
 from benchmarks.archives.recordings import MODEL, RATE, ROOT
 from benchmarks.processes.many_devices import sent_times
 from benchmarks.processes.many_rigs import repeat_for
-from rigwatch.wire.bus import Bus, connect
+from rigwatch.wire.bus import Bus, SharedLinks, connect
 from rigwatch.wire.messages import ESTIMATES
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.session import open_session
@@ -89,7 +90,8 @@ def measured(folder: Path, count: int, seconds: float) -> Found:
     """Run the chain and measure it."""
     paths = rig_files(folder, count)
     with started(folder, paths) as processes:
-        buses = [connect(load_rig(path), "subscriber", 60.0) for path in paths]
+        links = SharedLinks(count)
+        buses = [connect(load_rig(path), "subscriber", 60.0, links) for path in paths]
         heard = Estimates(buses, folder / "sent")
         assert wait_until(heard.all_there, 120.0, 0.05), "not all rigs were judged"
         repeat_for(SETTLE, heard.take)
@@ -101,6 +103,7 @@ def measured(folder: Path, count: int, seconds: float) -> Found:
         memory = {name: one.memory_info().rss / 1e6 for name, one in processes.items()}
         for bus in buses:
             bus.close()
+        links.close()
     late = np.concatenate(heard.late)
     p50, p99 = np.percentile(1e3 * late, [50, 99])
     core = {name: 100 * spent / took / count for name, spent in used.items()}

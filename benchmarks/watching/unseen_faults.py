@@ -58,17 +58,15 @@ class Drawn:
     verdict: str
 
 
-@cache
-def rig(number: int) -> tuple[RigParameters, RigModel]:
-    """A drawn rig, and what commissioning makes of it."""
-    draw = np.random.default_rng(SEED + number)
+def drawn_plant(draw: np.random.Generator) -> RigParameters:
+    """A rig whose mass, pressure, valve, dead volume and noise differ from the nominal ones."""
     nominal = RigParameters()
 
     def around(value: float, share: float) -> float:
         return float(value * draw.uniform(1.0 - share, 1.0 + share))
 
     noise = float(draw.uniform(0.7, 2.0))
-    plant = structs.replace(
+    return structs.replace(
         nominal,
         load_mass=around(nominal.load_mass, 0.2),
         mean_pressure=around(nominal.mean_pressure, 0.15),
@@ -79,6 +77,12 @@ def rig(number: int) -> tuple[RigParameters, RigModel]:
         accelerometer_noise=noise * nominal.accelerometer_noise,
         voltage_noise=noise * nominal.voltage_noise,
     )
+
+
+@cache
+def rig(number: int) -> tuple[RigParameters, RigModel]:
+    """A drawn rig, and what commissioning makes of it."""
+    plant = drawn_plant(np.random.default_rng(SEED + number))
     names: tuple[tuple[str, Role], ...] = (
         ("commissioning_chirp", "chirp"),
         ("healthy_sine_8hz_1v4", "healthy"),

@@ -11,13 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from monitor.alarms import AlarmJournal, AlarmRecord, read_journal
-from rigwatch.wire.messages import Alarm
+from monitor.alarms import read_journal
 
 LINK = ("link", "stale", "gap", "loss", "monitor_stale")
 KILL = (*LINK, "recording_stopped", "estimates_missing", "duplicate_source")
-HISTORY_BYTES = (16 << 20) - 20_000
-"""Length of a journal that is rotated soon [bytes]."""
 AFTER_S = 3.0
 """Time after a reason in which its alarms may still come [s]."""
 BEFORE_S = 0.5
@@ -82,18 +79,3 @@ def missing_in_journal(alarms: Iterable[dict[str, Any]], journal: Path) -> tuple
     written = {(one.alarm.name, one.alarm.t_ns) for one in records}
     heard = {(one["name"], one["t"]) for one in alarms if one["name"] != "monitor_stale"}
     return len(heard - written), len(older)
-
-
-def journal_of_years(path: Path) -> None:
-    """A journal that is almost long enough to be rotated."""
-    alarm = Alarm(
-        "departure", "normal", "error", "the rig no longer behaves as its healthy model", "",
-        "rig", 0, 1, 1_700_000_000_000_000_000, 0.0, 0.0, 0.0, False, "", -1,
-    )  # fmt: skip
-    record = AlarmRecord(alarm, active=False, latched=False, shelved_until_ns=0, grouped=False,
-                         text="of an earlier year")  # fmt: skip
-    journal = AlarmJournal(path)
-    journal.write([record])
-    line = path.stat().st_size
-    journal.write([record] * (HISTORY_BYTES // line - 1))
-    journal.close()

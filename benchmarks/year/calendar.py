@@ -5,12 +5,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-YEAR_S = 365 * 86_400.0
+DAY_S = 86_400.0
+YEAR_S = 365 * DAY_S
 ZONE = "Europe/Berlin"
 BEGIN = datetime(2027, 1, 1, tzinfo=UTC).timestamp()
 SESSIONS = 1000
-RUNNING_S = 30.0
-"""Length of a session [s]."""
+RUNNING_S = 25.0
+"""Length of a session [s]; one in which a process is killed takes as long as that."""
 AT_S, FOR_S = 12.0, 10.0
 """When a fault of a session sets in, and how long it lasts [s]."""
 

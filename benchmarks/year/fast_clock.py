@@ -65,6 +65,11 @@ class FastClock:
         with self._lock:
             return self._now(time.monotonic_ns()) + self._offset
 
+    def now_s(self) -> float:
+        """Time of this clock, which no step of Unix time changes [s]."""
+        with self._lock:
+            return self._now(time.monotonic_ns()) * 1e-9
+
     def set_rate(self, rate: float) -> None:
         """Go at another rate from now on."""
         with self._lock:

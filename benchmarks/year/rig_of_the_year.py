@@ -88,18 +88,13 @@ class RigOfTheYear:
         self._up = Lines(self._follow, env, *words)
         self._room = Lines(self.heard.append, env, "-m", "benchmarks.year.control_room", path)
         self._bus = connect(self.rig.config, "year", START_S)
-        self._estimates = self._bus.subscribe_lossy(ESTIMATES)
-        self._watching = True
-        self._watcher = threading.Thread(target=self._watch, daemon=True)
-        self._watcher.start()
+        self._estimates = self._bus.subscribe_lossy(ESTIMATES, capacity=1)
         if not self.recovered():
             raise TimeoutError(f"the rig did not come up: {self._status}")
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._watching = False
         self.clock.set_rate(1.0)
-        self._watcher.join()
         self._bus.close()
         for process in (self._room, self._up):
             process.end()
@@ -152,6 +147,8 @@ class RigOfTheYear:
 
     def lag_s(self) -> float:
         """Age of the newest estimate by the fast clock [s]."""
+        for block in self._estimates.drain():  # the newest alone is kept
+            self._estimated_ns = float(block.t_ns[-1])
         return (self.clock.wall_ns() - self._estimated_ns) * 1e-9
 
     def _answers(self) -> int:
@@ -162,9 +159,3 @@ class RigOfTheYear:
             self._status = event["processes"]
         elif event["event"] not in ("starting", "ready", "started"):
             self.endings.append(event)
-
-    def _watch(self) -> None:
-        while self._watching:
-            block = self._estimates.get(timeout=0.1)
-            if block is not None:
-                self._estimated_ns = float(block.t_ns[-1])

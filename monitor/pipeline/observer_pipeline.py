@@ -17,6 +17,8 @@ from monitor.model import EquationsPlant, RigModel
 from monitor.observer import (
     EMPTY,
     PREDICTED,
+    WEAK,
+    WEAKER,
     ChannelJumps,
     E,
     Observed,
@@ -59,6 +61,12 @@ class ObserverMonitor:
         self._signals = ObserverSignals(plant, remainder, model.sample_rate)
         self._equations = base_model(plant.model)
         self._follow(model)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The channels that drive the equations."""
+        layout = self._signals.layout
+        return layout.channels[: layout.motions[0]]
 
     def adopt(self, model: RigModel) -> None:
         """Use another model from the next sample, with which every stage begins as at a start.
@@ -116,7 +124,9 @@ class ObserverMonitor:
         conditions = self._conditions(admitted, seen, far, out)
         sensors = (*self._jump_conditions(admitted, jumped, out), *self._clipping.update(admitted))
         limit = self._force_limit(out, usual.extremes[d.USUAL_FRICTION])
-        return Result(self._estimates(block, admitted, seen, out, limit), (*conditions, *sensors))
+        estimates = self._estimates(block, admitted, seen, out, limit)
+        drive = seen.judged[admitted.padding :, WEAK] / WEAKER
+        return Result(estimates, (*conditions, *sensors), drive)
 
     def _hidden_edges(self, admitted: Admitted) -> NDArray[np.bool_]:
         """Whether missing samples have hidden an edge of an input, shape (n,)."""

@@ -30,6 +30,7 @@ from rigwatch.wire.rig_config import AlarmSection
 from rigwatch.wire.wiring_names import WIRING
 
 if TYPE_CHECKING:
+    from monitor.pipeline.drive_trial import DriveTrial
     from monitor.pipeline.observer_pipeline import ObserverMonitor
 
 Judged = tuple[EstimateBlock, tuple[Condition, ...]]
@@ -77,6 +78,7 @@ class RigMonitor:
         checked = {name for name in WIRING if settings_of(name, settings or {}).enabled}
         # Who has said that the sensors are as they are to be is not asked for the drive.
         self._wiring = WiringCheck(model, drive=DRIVE in checked) if checked - {DRIVE} else None
+        self._trial = trial_of(model) if self._wiring is not None and DRIVE in checked else None
 
     def update(self, block: SampleBlock) -> Watched | None:
         """Process the next block; None if it contains nothing new.
@@ -149,6 +151,10 @@ class RigMonitor:
         if self._wiring is None:
             return at, (*own, *more, *quality)
         wrong, wiring = self._wiring.update(fresh)
+        if self._trial is not None:
+            driven_wrong, found_wrong = self._trial.update(fresh, result)
+            wiring = (*wiring, *found_wrong)
+            wrong = _either(wrong, driven_wrong)
         wiring = (*wiring, *self._wiring_put_right(wiring, len(fresh)))
         if wrong is not None and wrong.any():
             at = replace(at, columns=tuple(_disarmed(column, wrong) for column in at.columns))
@@ -183,6 +189,8 @@ class RigMonitor:
         self._pipeline.adopt(model)
         if self._wiring is not None:
             self._wiring.adopt(model)
+        if self._trial is not None:
+            self._trial.adopt(model)
 
     def learn(self, block: SampleBlock) -> None:
         """Process a block that an earlier run has published: update the state, publish nothing."""
@@ -194,12 +202,21 @@ class RigMonitor:
         self._sensors.update(_fresh(block, result.estimates))
         if self._wiring is not None:
             self._wiring.update(_fresh(block, result.estimates))
+        if self._trial is not None:
+            self._trial.update(_fresh(block, result.estimates), result)
 
 
 def _fresh(block: SampleBlock, judged: EstimateBlock) -> SampleBlock:
     """The part of a block judged in this call, without samples judged before."""
     seen = judged.seq - block.seq
     return cut(block, seen, len(block)) if seen else block
+
+
+def _either(one: BoolArray | None, other: BoolArray | None) -> BoolArray | None:
+    """Where one of two holds; None holds nowhere."""
+    if one is None or other is None:
+        return other if one is None else one
+    return one | other
 
 
 def _disarmed(column: Column, wrong: BoolArray) -> Column:
@@ -228,6 +245,19 @@ def scheme_of(model: RigModel) -> "Monitor | ObserverMonitor":
     from monitor.pipeline.observer_pipeline import ObserverMonitor
 
     return ObserverMonitor(model)
+
+
+def trial_of(model: RigModel) -> "DriveTrial | None":
+    """The trial of drives for a model's plant; None if it has no equations of one input.
+
+    Raises:
+        ModelError: its equations are invalid.
+    """
+    if not isinstance(model.plant, EquationsPlant):
+        return None
+    from monitor.pipeline.drive_trial import drive_trial
+
+    return drive_trial(model)
 
 
 def compile_kernels(model: RigModel, detectors: Sequence[Detector] = ()) -> None:

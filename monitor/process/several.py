@@ -116,7 +116,7 @@ class Seat:
         if process is None or self._due or now >= self._look_at:
             return True
         try:
-            return len(process.reader) > 0
+            return process.reader.may_hold()
         except Exception as error:  # as in `_alone`
             self._fail(error)
             return False
@@ -229,6 +229,10 @@ class Seat:
             process.bus.close()
 
 
+def _nothing() -> None:
+    """Where each rig gets its messages on their own."""
+
+
 def _divided(items: Iterable[Item]) -> Iterable[Item]:
     for item in items:
         if isinstance(item, SampleBlock):
@@ -237,11 +241,21 @@ def _divided(items: Iterable[Item]) -> Iterable[Item]:
             yield item
 
 
-def one_turn(seats: Iterable[Seat], together: Callable[[], AbstractContextManager[object]]) -> None:
+def one_turn(
+    seats: Iterable[Seat],
+    together: Callable[[], AbstractContextManager[object]],
+    collect: Callable[[], None] = _nothing,
+) -> None:
     """Judge what has come of all rigs, send it, and only then store the positions.
 
     All are read before any is judged: a block of one that is judged late is as old as the others'.
+
+    Args:
+        seats: the rigs.
+        together: entered for the turn, so that what it sends leaves together.
+        collect: hands each rig what has come for several.
     """
+    collect()
     now = time.monotonic()
     busy = [seat for seat in seats if seat.has_work(now)]
     with together():
@@ -269,6 +283,7 @@ def take_turns(
     stop: threading.Event,
     heartbeat: Heartbeat,
     together: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
+    collect: Callable[[], None] = _nothing,
 ) -> None:
     """The loop over all rigs until `stop` is set.
 
@@ -276,12 +291,12 @@ def take_turns(
         seats: the rigs.
         stop: ends the loop.
         heartbeat: of the process.
-        together: entered for each turn, so that what it sends leaves together.
+        together, collect: for each turn, see `one_turn`.
     """
     tell_at = 0.0
     while not stop.is_set():
         began = time.monotonic()
-        one_turn(seats, together)
+        one_turn(seats, together, collect)
         if began >= tell_at:
             tell_at = began + LOOK_EVERY
             waits = waits_of(seat.waits for seat in seats)
@@ -306,7 +321,7 @@ def run_several(paths: list[Path]) -> int:
     links = SharedLinks(len(paths))
     seats = [Seat(path, _log.warning, partial(connect, links=links)) for path in paths]
     heartbeat.ready()
-    take_turns(seats, stop, heartbeat, links.together)
+    take_turns(seats, stop, heartbeat, links.together, links.collect)
     heartbeat.stopping()
     for seat in seats:
         seat.close()

@@ -4,6 +4,7 @@ configuration   every process      a value that an earlier version took and this
 model           monitor            keys that have come since it was written
 journal         monitor            the same, and lines that were torn
 position        monitor            damaged, or beyond what a device can have sent
+alarms sent   monitor, witness   damaged; the alarm of the witness that stands
 device          daq                damaged
 positions       recorder           damaged
 session         recorder           segments without an end, of a recorder that was killed
@@ -25,6 +26,7 @@ from monitor.detectors import detectors_of
 from monitor.model import model_text, model_versions
 from monitor.process import stored_position, suitable_model
 from rigwatch.doctor.kept import Kept
+from rigwatch.doctor.kept_alarms import MONITOR, WITNESS, kept_alarms
 from rigwatch.recorder import POSITIONS, load_positions, sessions_of
 from rigwatch.wire.delivery import LARGEST_SEQ
 from rigwatch.wire.errors import ConfigError, RigwatchError, reason_of
@@ -63,6 +65,7 @@ def kept_files(config: RigConfig, path: Path) -> Iterator[Kept]:
             journal = Path(config.monitor.journal)
             yield from _journal(journal)
             yield from _position(journal.with_name(f"{journal.name}.position"))
+            yield from kept_alarms(config.monitor.journal)
     if file := device_file(config):
         yield from _device(file)
     if config.recorder is not None:
@@ -73,7 +76,8 @@ def kept_files(config: RigConfig, path: Path) -> Iterator[Kept]:
 def in_use(config: RigConfig) -> Iterator[Path]:
     """The files that a running process of the rig has open."""
     if config.monitor is not None and config.monitor.journal:
-        yield Path(config.monitor.journal)
+        names = ("{}", MONITOR, WITNESS)
+        yield from (Path(name.format(config.monitor.journal)) for name in names)
     if config.recorder is not None:
         for folder in sessions_of(Path(config.recorder.folder), config.rig.id):
             yield from folder.glob(f"*{SUFFIX}")

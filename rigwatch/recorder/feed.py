@@ -67,6 +67,7 @@ class Feed:
             if line.numbered
         }
         self._unproved: list[tuple[float, Gap, str]] = []
+        self._of_recorder = bus.subscribe_own(GAPS, RUN.publisher)
         # Gaps last: those before show who may report some.
         others = [
             bus.subscribe(line) for line in _SUBSCRIBED if not (line.numbered or line is GAPS)
@@ -74,7 +75,8 @@ class Feed:
         self._others: list[Subscription] = [
             *others,
             *self._numbered.values(),
-            bus.subscribe(GAPS),
+            bus.subscribe_own(GAPS, ""),
+            self._of_recorder,
         ]
 
     def take(self) -> list[Message]:
@@ -108,14 +110,34 @@ class Feed:
     def _credible(self, subscription: Subscription) -> list[Message]:
         """Reports of losses by others, without those in the name of a process that is not theirs.
 
-        `rigwatch info` believes those of daq and monitor.
+        `rigwatch info` believes those of recorders, daq and monitor.
         """
+        found: list[Message] = []
+        for gap, sender in subscription.drain_from():
+            if self._is_own(gap):
+                continue
+            if gap.reporter not in RECORDERS:
+                self._unproved.append((time.monotonic(), gap, sender))
+            elif self._is_of_site(gap, subscription):
+                found.append(gap)
+            else:
+                self.foreign_gaps += 1
+        return [*found, *self._proved()]
+
+    def _is_of_site(self, gap: Gap, subscription: Subscription) -> bool:
+        """Whether a report comes from the site's recorder, and matters.
+
+        What another recorder lacks says nothing of this recording; a remote one has the reports of
+        its site's. Those come at a key that a bus with keys denies to everybody else.
+        """
+        return gap.reporter == RUN.publisher and subscription is self._of_recorder
+
+    def _proved(self) -> list[Message]:
+        """The waiting reports that come from the processes that they name, as far as known."""
         found: list[Message] = []
         now, waiting = time.monotonic(), self._unproved
         self._unproved = []
-        for at, gap, sender in [*waiting, *((now, *one) for one in subscription.drain_from())]:
-            if self._is_own(gap):
-                continue
+        for at, gap, sender in waiting:
             if self._is_by(gap, sender):
                 found.append(gap)
             elif now - at < PROVED_WITHIN and len(self._unproved) < MOST_UNPROVED:
@@ -126,10 +148,6 @@ class Feed:
 
     def _is_by(self, gap: Gap, sender: str) -> bool:
         """Whether a report comes from the process that it names, as far as that matters."""
-        if gap.reporter in RECORDERS:
-            # What another recorder lacks says nothing of this recording; a remote one has the
-            # reports of its site.
-            return self._name != RUN.publisher
         if gap.reporter == ALARMS.publisher:
             alarms = self._numbered[ALARMS.name]
             return alarms.is_process(gap.reporter, sender)

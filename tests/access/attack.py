@@ -44,7 +44,7 @@ STRANGERS = ("dashboard", "recorder", "device", "ack-eve")
 """Roles of the hostile clients, the last an operator."""
 MARK = b"\x01" * 16
 FOR_OPERATORS = (MODEL_KEY, "monitor/receiver", DEVICE_KEY, DEVICE_RUN_KEY)
-OF_RECORDERS = ("run", "health/recorder")
+OF_RECORDERS = ("run", "health/recorder", "gaps/recorder")
 DROPPED = ("rejected", "foreign_samples", "duplicate_samples")
 """Counters of the monitor for what it does not take for samples of its rig."""
 PACE_S = 0.0005

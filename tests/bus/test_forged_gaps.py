@@ -21,6 +21,33 @@ def gap(reporter: str, first: int, last: int, boot: int = BOOT, topic: str = "")
     return Gap("rig", boot, first, last, time.time_ns(), reporter, "lost", topic)
 
 
+def test_a_headquarters_counts_reports_of_the_sites_recorder_and_none_in_its_name(
+    tmp_path: Path,
+) -> None:
+    rig = TestRig(tmp_path, f'\n[recorder]\nfolder = "{tmp_path}/far"\nremote = true\n')
+    network, config = MemoryNetwork(), load_rig(rig.path)
+    daq, eve, site = (network.bus("bench", name) for name in ("daq", "eve", "recorder"))
+    ring = SampleRing(daq, 1024)
+    far = Recorder(config, describe_run(rig.path, config), network.bus("bench", "headquarters"))
+    block = wave(0, 64, BOOT, time.time_ns())
+    ring.add(block)
+    daq.publish(SAMPLES, block)
+    for topic in ("", "alarms"):
+        eve.publish(GAPS, gap("recorder", 64, 9999, topic=topic))
+        site.publish(GAPS, gap("recorder", 64, 66, topic=topic))
+
+    def taken() -> bool:
+        far.turn(time.monotonic(), time.time_ns())
+        return far.feed.samples == 64 and far.feed.foreign_gaps == 2
+
+    eventually(taken, "the stranger's are refused")
+    far.close(time.monotonic(), time.time_ns())
+    summary = summarise(open_session(far.store.folder))
+    (device,) = summary.devices
+    assert (device.samples, device.missing) == (64, 3)
+    assert summary.lost_messages == {"alarms": 3}
+
+
 def test_reports_count_that_come_from_whom_they_name_and_no_others(tmp_path: Path) -> None:
     rig = TestRig(tmp_path, f'\n[recorder]\nfolder = "{tmp_path}/sessions"\n')
     network, config = MemoryNetwork(), load_rig(rig.path)

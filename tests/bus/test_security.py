@@ -16,9 +16,11 @@ from rigwatch.wire.messages import (
     ALARMS,
     COMMANDS,
     EVENTS,
+    GAPS,
     HEALTH,
     AlarmCommand,
     Event,
+    Gap,
     Health,
     encode,
 )
@@ -116,6 +118,24 @@ def test_only_daq_and_recorder_say_how_they_are(secured: RigConfig) -> None:
             assert own[bus.process].drain() == []
     finally:
         for bus in (monitor, daq, recorder, dashboard):
+            bus.close()
+
+
+def test_only_the_recorder_reports_its_losses(secured: RigConfig) -> None:
+    names = ("monitor", "recorder", "dashboard", "daq")
+    reader, recorder, *strangers = (connect(secured, name, PATIENCE) for name in names)
+    try:
+        reports = reader.subscribe_own(GAPS, "recorder")
+        for stranger in strangers:
+            until_reached(stranger, reader)
+            forged = encode(Gap("rig", 7, 0, 9, 1, "recorder", "lost"))
+            stranger.transport.put(stranger.key(GAPS.key_of("recorder")), forged)
+            until_reached(stranger, reader)
+        recorder.publish(GAPS, Gap("rig", 7, 5, 5, 1, "recorder", "lost"))
+        assert reports.get(timeout=PATIENCE).first == 5
+        assert reports.drain() == []
+    finally:
+        for bus in (reader, recorder, *strangers):
             bus.close()
 
 

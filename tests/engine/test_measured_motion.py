@@ -26,6 +26,7 @@ from rigwatch.physics.engine.equations.model import (
     shipped_models,
 )
 from rigwatch.physics.engine.equations.system import Placement, compose
+from rigwatch.physics.engine.equations.variants import with_variants
 from rigwatch.physics.engine.fit.measured_recording import motion_recording
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.physics.engine.fit.smoothing import best_width, smoothed
@@ -283,7 +284,9 @@ def test_fit_along_the_motion_names_what_sits_on_a_bound() -> None:
 
 
 def test_sensor_states_are_those_that_no_other_state_needs() -> None:
-    assert sensor_states(shipped_models()["servo-pneumatic"]) == {"mean"}
+    rig = shipped_models()["servo-pneumatic"]
+    assert sensor_states(rig) == {"mean"}
+    assert sensor_states(with_variants(rig, ["coupled_twice"])) == {"mean", "second_mean"}
     # The actuator's force moves the mass.
     assert sensor_states(_actuated_mass()) == frozenset()
 

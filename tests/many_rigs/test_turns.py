@@ -9,7 +9,7 @@ from itertools import pairwise
 import pytest
 
 from daq.turns import PART, Turns
-from rigwatch.wire.bus.burst import Burst
+from rigwatch.wire.bus.several.burst import Burst
 from tests.waiting import eventually
 
 
@@ -127,7 +127,7 @@ def test_what_is_sent_in_a_turn_leaves_in_order_at_its_end() -> None:
 def test_what_waits_for_too_long_leaves_before_a_long_turn_ends(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("rigwatch.wire.bus.burst.GATHER", 0.0)
+    monkeypatch.setattr("rigwatch.wire.bus.several.burst.GATHER", 0.0)
     burst, sent = Burst(), list[int]()
     with burst.held():
         burst.add(lambda: sent.append(0))

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from rigwatch.wire.bus import SharedLinks, connect
-from rigwatch.wire.bus.zenoh_transport import WAITING
+from rigwatch.wire.bus.several import WAITING
 from rigwatch.wire.delivery import SampleReader, SampleRing
 from rigwatch.wire.messages import ALARMS, SAMPLES, SampleBlock
 from tests.bus.rig import TestRig, kill

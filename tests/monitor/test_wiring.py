@@ -254,19 +254,3 @@ def test_the_models_word_is_kept_in_its_file() -> None:
     broken = model_text(model).replace("wiring_swapped", "wiring_any")
     with pytest.raises(ConfigError, match="accepted_wiring"):
         parse_model(broken, "broken")
-
-
-@pytest.mark.parametrize(
-    ("factor", "told"),
-    [(1000.0, "not_judged"), (10.0, "not_judged"), (0.1, "other_fault"), (-1.0, "other_fault")],
-)
-def test_with_equations_a_wrong_drive_is_told_although_nothing_names_it(
-    factor: float, told: str
-) -> None:
-    channels = run(SINE, 12.0)
-    healthy, _ = watched(channels, observed_rig.model())
-    channels["voltage"] = factor * channels["voltage"]
-    times, _ = watched(channels, observed_rig.model())
-    assert told not in healthy
-    assert times[told] <= 3.0
-    assert "dry_friction" not in times

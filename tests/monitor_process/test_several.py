@@ -124,7 +124,7 @@ class Unreadable:
     def __getattr__(self, name: str) -> object:
         return getattr(self._reader, name)
 
-    def __len__(self) -> int:
+    def may_hold(self) -> bool:
         raise OSError("the disk is gone")
 
 

@@ -143,3 +143,33 @@ def test_freed_tuples_are_not_kept_for_months(tmp_path: Path, begin: str) -> Non
     let_go, still_there = said_by(tmp_path, TUPLES_KEPT, begin, 90.0)
     assert int(let_go) >= 1500
     assert still_there == "False", "the thread ends with the process's work"
+
+
+PASSING_NEEDS = """
+import os, random
+import rigwatch.witness.process
+from rigwatch.wire.host import settle_memory, use_few_pools
+from tools.memory_series import memory_kb
+
+use_few_pools()
+settle_memory()
+before = memory_kb(os.getpid())
+for _ in range(20):
+    needed = []
+    needed = [bytes(random.choice((40, 72, 120, 300, 450))) for _ in range(2500)]
+print(round(memory_kb(os.getpid()) - before), sum(map(len, needed)) // 1000)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="memory is read from /proc")
+def test_what_is_needed_for_a_moment_finds_room_that_is_there() -> None:
+    said = subprocess.run(
+        [sys.executable, "-c", PASSING_NEEDS],
+        check=True,
+        timeout=60,
+        capture_output=True,
+        text=True,
+    )
+    grown_kb, needed_kb = map(int, said.stdout.split())
+    assert needed_kb > 400
+    assert grown_kb < needed_kb / 4

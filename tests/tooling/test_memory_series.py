@@ -10,6 +10,7 @@ BEFORE, AT, RISE = 30_000.0, 60, 1_024.0
 def series(kb: list[float], pid: int = 7) -> Memory:
     memory = Memory()
     memory.seen["witness"] = [(pid, one) for one in kb]
+    memory.at_s = [9.0 * look for look in range(len(kb))]
     return memory
 
 
@@ -41,6 +42,18 @@ def test_only_the_process_that_lived_last_is_judged() -> None:
     memory = series(noisy(BEFORE, 50), pid=1)
     memory.seen["witness"] += series(noisy(BEFORE + RISE, 50), pid=2).seen["witness"]
     assert memory.steps("witness") == []
+
+
+def test_growth_is_told_by_the_hour_with_how_sure_it_is() -> None:
+    steady = series([BEFORE + 3.0 * i for i in range(400)]).growth("witness")
+    assert steady.looks == 200
+    assert steady.hours == 199 * 9.0 / 3600.0
+    assert abs(steady.an_hour - 100.0 * 3.0 * 400 / (BEFORE + 900.0)) < 0.1
+    assert steady.unsure < 0.01 * steady.percent
+
+    one_step = series([*noisy(BEFORE, 300), *noisy(BEFORE + RISE, 100)]).growth("witness")
+    assert one_step.unsure > one_step.percent / 2, "another run may have had none, or two"
+    assert series(noisy(BEFORE, 400)).growth("witness").unsure < 0.1
 
 
 def test_the_table_has_each_look_at_each_process(tmp_path: Path) -> None:

@@ -17,7 +17,10 @@ from monitor.alarms import read_journal
 from monitor.model import load_model, model_versions
 from rigwatch.commands import main
 from rigwatch.recorder import newest
+from rigwatch.wire.bus import KeptMessages
 from rigwatch.wire.host.ports import free_port
+from rigwatch.wire.messages import encode
+from rigwatch.wire.ordering import Numbered
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.session import open_session
 
@@ -174,6 +177,54 @@ def test_a_silence_that_earlier_versions_took_is_removed_and_all_else_stays(
     assert rig.read_text() == slow.replace("stale_after = 0.5\n", "")
     (backup,) = tmp_path.glob("rig.toml.backup-*")
     assert backup.read_text() == slow
+
+
+def test_the_alarms_that_were_sent_are_told_and_damaged_ones_set_aside(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig, journal = rig_of("2026-11-22", tmp_path), tmp_path / "alarms.jsonl"
+    records, _ = read_journal(journal)
+    monitor, witness = (Path(f"{journal}{end}") for end in (".said", ".stale.said"))
+    for path in (monitor, witness):
+        said = KeptMessages(path)
+        for run in (5, 6):
+            said.begin(run)
+            for number, record in enumerate(records):
+                said.write(Numbered(run, number, encode(record.alarm)))
+        said.close()
+    standing = Path(f"{journal}.stale")
+    standing.write_bytes(encode(records[0].alarm))
+
+    told = doctor(capsys, rig)
+    sent = f"{2 * len(records)} alarms of 2 runs"
+    assert told["alarms sent"] == {
+        "what": "alarms sent", "level": "ok", "text": f"{monitor}: {sent}", "remedy": ""
+    }  # fmt: skip
+    assert told["witness's alarms sent"]["text"] == f"{witness}: {sent}"
+    assert told["witness's alarm"]["text"].startswith(f"{standing}: {records[0].alarm.name} is")
+
+    damaged = b"x" + witness.read_bytes()[1:]
+    witness.write_bytes(damaged)
+    standing.write_bytes(b"x")
+    files = {"witness's alarms sent", "witness's alarm"}
+    told = doctor(capsys, rig)
+    assert {what for what in told if "--fix: set it aside" in told[what]["remedy"]} == files
+    doctor(capsys, rig, "--fix")
+    assert not files & doctor(capsys, rig).keys()
+    (backup,) = tmp_path.glob(f"{witness.name}.backup-*")
+    assert backup.read_bytes() == damaged
+
+
+@pytest.mark.parametrize("name", ["alarms.jsonl.said", "alarms.jsonl.stale.said"])
+def test_nothing_is_mended_while_alarms_are_being_sent(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = rig_of("2026-11-22", tmp_path)
+    cut(tmp_path / "alarms.jsonl", 0.97)
+    said = KeptMessages(tmp_path / name)
+    assert main(["doctor", str(rig), "--fix"]) == 2
+    said.close()
+    assert "stopped for --fix" in capsys.readouterr().err
 
 
 def test_a_promoted_model_stays_the_one_in_force(

@@ -30,7 +30,7 @@ _SAYS: dict[str, tuple[str, ...]] = {
     "device": (),
     "daq": (SAMPLES.key, HEALTH.key_of("daq")),
     "monitor": (ALARMS.key, ESTIMATES.key, MODELS.key),
-    "recorder": (RUN.key, HEALTH.key_of("recorder")),
+    "recorder": (RUN.key, HEALTH.key_of("recorder"), GAPS.key_of("recorder")),
     "witness": (ALARMS.key,),
     "dashboard": (),
     "operator": (COMMANDS.key,),

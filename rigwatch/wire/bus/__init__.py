@@ -42,7 +42,7 @@ from rigwatch.wire.bus.connection import (
     open_router,
 )
 from rigwatch.wire.bus.inbox import Inbox
-from rigwatch.wire.bus.kept_messages import KeptMessages
+from rigwatch.wire.bus.kept_messages import KeptMessages, kept_runs
 from rigwatch.wire.bus.member import unique_process
 from rigwatch.wire.bus.message_ring import SAID_KEY
 from rigwatch.wire.bus.ring_questions import RingQuestions
@@ -86,6 +86,7 @@ __all__ = [
     "command_mark",
     "connect",
     "joined",
+    "kept_runs",
     "log_refusals",
     "marked",
     "open_router",

@@ -52,7 +52,10 @@ class Bus(Member):
         return self._subscribed(topic, topic.keys, capacity)
 
     def subscribe_own(self, topic: Topic, process: str) -> Subscription:
-        """The messages that only `process` may send: its role, if the bus has keys."""
+        """The messages at the topic's key of `process`, at which only its role may send.
+
+        That is so if the bus has keys. Processes without a key of their own share one.
+        """
         return self._subscribed(topic, (topic.key_of(process),), QUEUE_CAPACITY)
 
     def _subscribed(self, topic: Topic, keys: Iterable[str], capacity: int) -> Subscription:

@@ -114,7 +114,7 @@ class CompleteSubscription(Subscription):
                 self._end_assumed(process)
         closers = [
             self._bus.watch_names(places, self._token),
-            self._inbox.follow(self._bus.transport, self._bus.key(self.topic.key), self._receive),
+            self._inbox.follow(self._bus, self.topic, self._receive),
         ]
         self._closers = [*closers, self._questions.close]
 

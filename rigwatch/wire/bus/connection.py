@@ -75,17 +75,23 @@ class SharedLinks:
     @contextlib.contextmanager
     def together(self) -> Iterator[None]:
         """Send what rigs put meanwhile together, at the end or if it has waited for too long."""
-        held = [place.link for place in tuple(self._places.values()) if place.link is not None]
         with contextlib.ExitStack() as stack:
-            for link in held:
+            for link in self._made():
                 stack.enter_context(link.together())
             yield
 
+    def collect(self) -> None:
+        """Hand to each rig what has come for several."""
+        for link in self._made():
+            link.collect()
+
     def close(self) -> None:
         """Close the links, after all transports over them."""
-        for place in self._places.values():
-            if place.link is not None:
-                place.link.close()
+        for link in self._made():
+            link.close()
+
+    def _made(self) -> list["ZenohTransport"]:
+        return [place.link for place in tuple(self._places.values()) if place.link is not None]
 
 
 class _Place:

@@ -12,7 +12,9 @@ from contextlib import suppress
 from queue import Empty, SimpleQueue
 from typing import Generic, TypeVar
 
-from rigwatch.wire.bus.transport import Close, Receive, Take, Transport
+from rigwatch.wire.bus.member import Member
+from rigwatch.wire.bus.transport import Close, Receive, Waiting
+from rigwatch.wire.messages import Topic
 
 T = TypeVar("T")
 LOOK_EVERY = 0.005
@@ -29,11 +31,11 @@ class Inbox(Generic[T]):
     def __init__(self, capacity: int) -> None:
         self._capacity = capacity
         self._items: SimpleQueue[T] = SimpleQueue()
-        self._collect: Take | None = None
+        self._outside: Waiting | None = None
 
-    def follow(self, transport: Transport, key: str, receive: Receive) -> Close:
-        """Pass each message put to `key` to `receive`, which accepts what it is to keep."""
-        self._collect, close = transport.listen_waiting(key, receive)
+    def follow(self, bus: Member, topic: Topic, receive: Receive) -> Close:
+        """Pass each message of a topic to `receive`, which accepts what it is to keep."""
+        self._outside, close = bus.hear(topic, receive)
         return close
 
     def accept(self, message: T) -> bool:
@@ -45,13 +47,18 @@ class Inbox(Generic[T]):
 
     def put(self, item: T) -> None:
         """Add anything else, behind the messages that came before it."""
-        if self._collect is not None:
-            self._collect()
+        if self._outside is not None:
+            self._outside.take()
         self._items.put(item)
 
+    def may_hold(self) -> bool:
+        """Whether something may wait: a look that costs less than the number."""
+        outside = self._outside
+        return self._items.qsize() > 0 or (outside is not None and outside.may_hold())
+
     def __len__(self) -> int:
-        if self._collect is not None:
-            self._collect()
+        if self._outside is not None:
+            self._outside.take()
         return self._items.qsize()
 
     def take(self, timeout: float) -> list[T]:
@@ -60,7 +67,7 @@ class Inbox(Generic[T]):
         found: list[T] = []
         while not found and not len(self) and (left := until - time.monotonic()) > 0.0:
             # A channel does not wake its reader.
-            wait = left if self._collect is None else min(left, LOOK_EVERY)
+            wait = left if self._outside is None else min(left, LOOK_EVERY)
             with suppress(Empty):
                 found.append(self._items.get(timeout=wait))
         return found + [self._items.get_nowait() for _ in range(self._items.qsize())]

@@ -22,6 +22,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rigwatch.wire.bus.transport import MAX_PAYLOAD
+from rigwatch.wire.errors import MessageError
 from rigwatch.wire.ordering import Numbered, PastRun, PastRuns
 
 HALF = 1 << 18
@@ -176,6 +177,25 @@ class KeptMessages:
         self._open()
         if self._run and (not self._waiting or self._waiting[0].seq != BEGIN):
             self._put(self._beginning())
+
+
+def kept_runs(path: Path, half: int = HALF) -> list[PastRun]:
+    """The runs in a file, which is left as it is and may be in use.
+
+    Args:
+        path: the file.
+        half: size of a half [bytes].
+
+    Raises:
+        OSError: it cannot be read.
+        MessageError: a half cannot be read, so that nothing in the file counts.
+    """
+    with path.open("rb") as file:
+        content = file.read(2 * half)
+    halves = _halves(content, half)
+    if content.strip(b"\0") and not halves:
+        raise MessageError(f"{path}: found a damaged half, expected two of {half} bytes")
+    return _runs_of(halves)
 
 
 class _Half:

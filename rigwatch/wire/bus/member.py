@@ -8,7 +8,15 @@ from rigwatch.wire.access import CommandSigner
 from rigwatch.wire.bus.kept_messages import KeptMessages
 from rigwatch.wire.bus.message_ring import LARGEST_NUMBERED, RING_BYTES, Outlet
 from rigwatch.wire.bus.tokens import Changed, NamedToken, NamedTokens
-from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Transport
+from rigwatch.wire.bus.transport import (
+    MAX_PAYLOAD,
+    Answer,
+    Close,
+    Receive,
+    Transport,
+    Waiting,
+    send,
+)
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.messages import ALIVE_KEY, Message, Topic, bus_key, encode
 
@@ -61,7 +69,13 @@ class Member:
         if topic.numbered:
             self._numbered().put(topic, payload)
         else:
-            self.transport.put(self.key(topic.key_of(self.process)), payload)
+            send(self.transport, self.rig, topic, self.process, payload)
+
+    def hear(self, topic: Topic, receive: Receive) -> tuple[Waiting | None, Close]:
+        """Call `receive` with the messages of a topic, see `Transport.listen_waiting`."""
+        if topic.joined:
+            return self.transport.listen_among(self.rig, topic.key, receive)
+        return self.transport.listen_waiting(self.key(topic.key), receive)
 
     def announce(self, kept: KeptMessages | None = None) -> None:
         """Show subscribers who sends numbered messages here, before the first one.

@@ -12,7 +12,8 @@ from typing import TypeVar
 
 from rigwatch.wire.access import CommandSigner
 from rigwatch.wire.bus.bus import Bus
-from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, Take, answered
+from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, Waiting, answered
+from rigwatch.wire.messages import bus_key
 
 T = TypeVar("T")
 _IDENTITIES = (f"process-{number}" for number in itertools.count(1))
@@ -66,9 +67,17 @@ class MemoryTransport:
         """Call `receive` with each payload put to `key`, its sender's identity and its mark."""
         return self._register(self._network.listeners.setdefault(key, []), receive)
 
-    def listen_waiting(self, key: str, receive: Receive) -> tuple[Take | None, Close]:
+    def listen_waiting(self, key: str, receive: Receive) -> tuple[Waiting | None, Close]:
         """The same: nothing waits here."""
         return None, self.listen_from(key, receive)
+
+    def put_among(self, rig: str, key: str, payload: bytes, mark: bytes = b"") -> None:
+        """Send on its own: nothing is gained here by sending it among others."""
+        self.put(bus_key(rig, key), payload, mark)
+
+    def listen_among(self, rig: str, key: str, receive: Receive) -> tuple[Waiting | None, Close]:
+        """As `listen_waiting`."""
+        return self.listen_waiting(bus_key(rig, key), receive)
 
     def serve(self, key: str, answer: Answer) -> Close:
         """Answer queries to `key`."""

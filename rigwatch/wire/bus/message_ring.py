@@ -20,7 +20,7 @@ import zstandard
 
 from rigwatch.wire.bus.kept_messages import KeptMessages
 from rigwatch.wire.bus.tokens import NamedToken
-from rigwatch.wire.bus.transport import MAX_PAYLOAD, Transport
+from rigwatch.wire.bus.transport import MAX_PAYLOAD, Transport, send
 from rigwatch.wire.messages import ALARMS, TOPICS, Topic, bus_key
 from rigwatch.wire.ordering import UNKNOWN, Ask, Numbered, PastRuns, RingReply, first_fitting
 
@@ -141,7 +141,7 @@ class Outlet:
         self.run = 1 + secrets.randbits(52)
         self._kept = kept
         self._transport = transport
-        self._rig = rig
+        self._rig, self._process = rig, process
         numbered = [topic.name for topic in TOPICS if topic.numbered]
         self._rings = {name: MessageRing(self.run, ring_bytes) for name in numbered}
         past = kept.past if kept else None
@@ -167,4 +167,4 @@ class Outlet:
         message = self._rings[topic.name].add(payload)
         if self._kept and topic is ALARMS:
             self._kept.write(message)
-        self._transport.put(bus_key(self._rig, topic.key), payload, message.mark)
+        send(self._transport, self._rig, topic, self._process, payload, mark=message.mark)

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import Protocol
 
+from rigwatch.wire.messages import Topic, bus_key
+
 MAX_PAYLOAD = 1 << 18
 """Largest payload of a message or reply [bytes]; larger ones are refused."""
 
@@ -12,10 +14,18 @@ REFUSED_MARK, DENIED_MARK = b"zenoh_link_tls::unicast", b"Msg intercepted!"
 Close = Callable[[], None]
 Receive = Callable[[bytes, str, bytes], None]
 """Called with a payload, the identity of its sender and its mark."""
-Take = Callable[[], None]
-"""Passes on the messages that wait; may be called in any thread."""
 Answer = Callable[[bytes], list[bytes]]
 """Returns a query's replies as bytes, each at most `MAX_PAYLOAD` long."""
+
+
+class Waiting(Protocol):
+    """Messages that wait for a reader in its transport."""
+
+    def take(self) -> None:
+        """Pass them on, in order; may be called in any thread."""
+
+    def may_hold(self) -> bool:
+        """Whether there may be some; where rigs share messages, since the last `collect`."""
 
 
 class Transport(Protocol):
@@ -34,11 +44,20 @@ class Transport(Protocol):
         With it come the sender's `identity`, "" if unknown, and the mark.
         """
 
-    def listen_waiting(self, key: str, receive: Receive) -> tuple[Take | None, Close]:
-        """The same, where messages may wait for calls of the function returned; None: they don't.
+    def listen_waiting(self, key: str, receive: Receive) -> tuple[Waiting | None, Close]:
+        """The same, where messages may wait until they are taken, in that thread; None: they don't.
 
-        It passes them on in order, in the caller's thread. Of too many the oldest are dropped.
+        Of too many the oldest are dropped.
         """
+
+    def put_among(self, rig: str, key: str, payload: bytes, mark: bytes = b"") -> None:
+        """Send at a rig's `key`, among the messages of other rigs if rigs share the link.
+
+        Who listens at the whole key gets it as with `put`.
+        """
+
+    def listen_among(self, rig: str, key: str, receive: Receive) -> tuple[Waiting | None, Close]:
+        """As `listen_waiting` at a rig's `key`, for what is sent with `put_among`."""
 
     def serve(self, key: str, answer: Answer) -> Close:
         """Answer queries to `key`, in a thread of the transport."""
@@ -60,6 +79,16 @@ class Transport(Protocol):
 
     def close(self) -> None:
         """Close everything opened through this transport."""
+
+
+def send(
+    transport: Transport, rig: str, topic: Topic, process: str, payload: bytes, *, mark: bytes = b""
+) -> None:
+    """Send a message of a topic as `process` of a rig."""
+    if topic.joined:
+        transport.put_among(rig, topic.key, payload, mark)
+    else:
+        transport.put(bus_key(rig, topic.key_of(process)), payload, mark)
 
 
 def answered(answer: Answer, question: bytes) -> list[bytes]:

@@ -21,14 +21,23 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from typing import Any
+from typing import Any, TypeVar
 
 import zenoh
 from zenoh.handlers import Callback, RingChannel
 
-from rigwatch.wire.bus.burst import Burst
-from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, Take, answered
+from rigwatch.wire.bus.several import (
+    WAITING,
+    Alone,
+    Among,
+    Following,
+    JointLink,
+    Received,
+    alone_key,
+)
+from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, Waiting, answered
 from rigwatch.wire.errors import BusError, NoRouterError
+from rigwatch.wire.messages import bus_key
 
 RETRY_MS = (100, 200)
 BATCHES = 16
@@ -39,8 +48,10 @@ MOST_ASKED = 4
 """Queries at a time over a link that rigs share: after a stall all ask at once, and answers that
 come too late would be asked for again, without end.
 """
-WAITING = 256
-"""Messages of a topic that wait for a process of several rigs: nine seconds of samples."""
+JOINTS_WAITING = 1024
+"""Joined messages that wait, of which many rigs send up to seven in a turn: five seconds."""
+UNSURE = 1.0
+"""Time after which a router has told whether anybody listens at a key [s]."""
 LEASE = 10.0
 """Silence after which a link counts as broken [s]."""
 ACCEPT_MS, MOST_PENDING = 1000, 1000
@@ -166,6 +177,101 @@ def _reach(
             raise NoRouterError(f"no router answers at {endpoint}: {remedy}")
 
 
+class _Line:
+    """A key at which a session sends."""
+
+    def __init__(self, session: Any, key: str) -> None:
+        self._publisher = session.declare_publisher(
+            key,
+            congestion_control=zenoh.CongestionControl.DROP,
+            reliability=zenoh.Reliability.RELIABLE,
+        )
+        self._info = zenoh.SourceInfo(self._publisher.id, 0)
+
+    def put(self, payload: bytes, mark: bytes) -> None:
+        """Send without waiting; dropped if the link is full or down."""
+        with contextlib.suppress(zenoh.ZError):
+            self._publisher.put(payload, source_info=self._info, attachment=mark or None)
+
+    def undeclare(self) -> None:
+        """Give up the key."""
+        self._publisher.undeclare()
+
+
+class _AttendedLine(_Line):
+    """A line that follows whether anybody listens."""
+
+    def __init__(self, session: Any, key: str) -> None:
+        super().__init__(session, key)
+        self._listened = False
+        self._unsure_until: float | None = time.monotonic() + UNSURE
+        self._told = self._publisher.declare_matching_listener(_direct(self._change))
+        if self._publisher.matching_status.matching:
+            self._listened = True
+
+    def _change(self, status: Any) -> None:
+        self._listened = status.matching
+
+    def undeclare(self) -> None:
+        """Give up the key."""
+        self._told.undeclare()
+        super().undeclare()
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether anybody listens, or the router has not had the time to tell."""
+        if self._unsure_until is not None and time.monotonic() >= self._unsure_until:
+            self._unsure_until = None
+        return self._listened or self._unsure_until is not None
+
+
+L = TypeVar("L", bound=_Line)
+
+
+class _Channel:
+    """What arrives at a key, kept by Zenoh until it is taken: the oldest gives way to the newest.
+
+    A process of many rigs would otherwise be interrupted by each message, and its loop wait for the
+    interpreter each time.
+    """
+
+    def __init__(self, session: Any, key: str, capacity: int) -> None:
+        self._subscriber = session.declare_subscriber(key, RingChannel(capacity))
+        self._handler = self._subscriber.handler
+
+    def following(self) -> Received | None:
+        """The next message; None if there is none."""
+        try:
+            sample = self._handler.try_recv()
+        except zenoh.ZError:  # closed meanwhile
+            return None
+        return sample if sample is None else _received(sample)
+
+    def undeclare(self) -> None:
+        """Take no more."""
+        self._subscriber.undeclare()
+
+
+class _WaitingChannel(_Channel):
+    """A channel for one reader."""
+
+    def __init__(self, session: Any, key: str, receive: Receive) -> None:
+        super().__init__(session, key, WAITING)
+        self._receive, self._lock = receive, threading.Lock()
+
+    def take(self) -> None:
+        """Pass on what waits, in order."""
+        with self._lock:
+            for _ in range(WAITING):
+                if (found := self.following()) is None:
+                    return
+                self._receive(*found)
+
+    def may_hold(self) -> bool:
+        """Only a look into it tells."""
+        return True
+
+
 class ZenohTransport:
     """What one process does on one bus, over a Zenoh session.
 
@@ -174,7 +280,8 @@ class ZenohTransport:
         leave: closes the session; None if it is not this transport's alone, which then takes back
             what it has declared.
         asking: held during a query.
-        burst: sends what rigs that share the session put; None sends at once.
+        joint: what rigs that share the session have in common; None for a rig alone.
+        keyless: whether the router has no keys: otherwise no role may speak for several rigs.
     """
 
     def __init__(
@@ -182,15 +289,18 @@ class ZenohTransport:
         session: Any,
         leave: Close | None = None,
         asking: AbstractContextManager[object] | None = None,
-        burst: Burst | None = None,
+        joint: JointLink | None = None,
+        *,
+        keyless: bool = True,
     ) -> None:
-        self._session, self._leave = session, leave
+        self._session, self._leave, self._keyless = session, leave, keyless
         self._asking = asking or contextlib.nullcontext()
         self._shared = threading.BoundedSemaphore(MOST_ASKED)
-        self._burst = burst
-        self._gathered = Burst()
-        self._publishers: dict[str, Any] = {}
-        self._lock = threading.Lock()
+        self._joint = joint
+        self._common = JointLink(self._attended, self._joint_channel)
+        self._lines: dict[str, _Line] = {}
+        self._outlets: dict[tuple[str, str], Alone | Among] = {}
+        self._lock = threading.RLock()
         self._kept: list[Any] = []
 
     @classmethod
@@ -213,15 +323,21 @@ class ZenohTransport:
             BusError: the endpoint is not well formed, or no router answers there.
         """
         session = _reach(endpoint, timeout, lease, secured or {}, stop)
-        return cls(session, session.close)
+        return cls(session, session.close, keyless=not secured)
 
     def beside(self) -> "ZenohTransport":
         """Another transport over the same session, which it leaves open when it is closed."""
-        return ZenohTransport(self._session, asking=self._shared, burst=self._gathered)
+        return ZenohTransport(
+            self._session, asking=self._shared, joint=self._common, keyless=self._keyless
+        )
 
     def together(self) -> AbstractContextManager[None]:
         """Send what transports over the same session put meanwhile together."""
-        return self._gathered.held()
+        return self._common.burst.held()
+
+    def collect(self) -> None:
+        """Hand to transports over the same session what has come in joined messages."""
+        self._common.distribute()
 
     @property
     def identity(self) -> str:
@@ -230,56 +346,81 @@ class ZenohTransport:
 
     def put(self, key: str, payload: bytes, mark: bytes = b"") -> None:
         """Send without waiting; dropped if the link is full or down."""
-        publisher, info = self._publishers.get(key) or self._declare_publisher(key)
-
-        def send() -> None:
-            with contextlib.suppress(zenoh.ZError):
-                publisher.put(payload, source_info=info, attachment=mark or None)
-
-        if self._burst is None:
-            send()
+        line = self._lines.get(key) or self._line(key)
+        if self._joint is None:
+            line.put(payload, mark)
         else:
-            self._burst.add(send)
+            self._joint.burst.add(lambda: line.put(payload, mark))
 
-    def _declare_publisher(self, key: str) -> Any:
+    def put_among(self, rig: str, key: str, payload: bytes, mark: bytes = b"") -> None:
+        """The same, at a rig's key, among the messages of the other rigs of this process."""
+        if not self._keyless:
+            self.put(bus_key(rig, key), payload, mark)
+            return
+        outlet = self._outlets.get((rig, key)) or self._outlet(rig, key)
+        outlet.put(payload, mark)
+
+    def _line(self, key: str) -> _Line:
         with self._lock:
-            if key not in self._publishers:
-                publisher = self._session.declare_publisher(
-                    key,
-                    congestion_control=zenoh.CongestionControl.DROP,
-                    reliability=zenoh.Reliability.RELIABLE,
+            if key not in self._lines:
+                self._lines[key] = self._kept_line(_Line(self._session, key))
+            return self._lines[key]
+
+    def _attended(self, key: str) -> _AttendedLine:
+        return self._kept_line(_AttendedLine(self._session, key))
+
+    def _kept_line(self, line: L) -> L:
+        self._kept.append(line)
+        return line
+
+    def _outlet(self, rig: str, key: str) -> Alone | Among:
+        own = bus_key(rig, key)
+        with self._lock:
+            if (rig, key) not in self._outlets:
+                self._outlets[rig, key] = (
+                    Alone(self._line(own), self._attended(alone_key(own)))
+                    if self._joint is None
+                    else Among(
+                        rig,
+                        self._attended(own),
+                        self._line(alone_key(own)),
+                        self._joint.sender(key),
+                        self._joint.burst,
+                    )
                 )
-                self._publishers[key] = publisher, zenoh.SourceInfo(publisher.id, 0)
-            return self._publishers[key]
+            return self._outlets[rig, key]
 
     def listen_from(self, key: str, receive: Receive) -> Close:
         """Call `receive` with each payload put to `key`, its sender and mark, in Zenoh's thread."""
-        take = _direct(lambda s: receive(s.payload.to_bytes(), _sender(s), _mark(s)))
+        take = _direct(lambda sample: receive(*_received(sample)))
         return self._keep(self._session.declare_subscriber(key, take))
 
-    def listen_waiting(self, key: str, receive: Receive) -> tuple[Take | None, Close]:
-        """The same; where rigs share the session, messages wait in a channel of Zenoh's own.
-
-        A process of many rigs would otherwise be interrupted by each message, and its loop wait for
-        the interpreter each time.
-        """
-        if self._burst is None:
+    def listen_waiting(self, key: str, receive: Receive) -> tuple[Waiting | None, Close]:
+        """The same; where rigs share the session, messages wait in a channel of Zenoh's own."""
+        if self._joint is None:
             return None, self.listen_from(key, receive)
-        subscriber = self._session.declare_subscriber(key, RingChannel(WAITING))
-        channel, lock = subscriber.handler, threading.Lock()
+        channel = _WaitingChannel(self._session, key, receive)
+        return channel, self._keep(channel)
 
-        def take() -> None:
-            with lock:
-                for _ in range(WAITING):
-                    try:
-                        sample = channel.try_recv()
-                    except zenoh.ZError:  # closed meanwhile
-                        return
-                    if sample is None:
-                        return
-                    receive(sample.payload.to_bytes(), _sender(sample), _mark(sample))
+    def listen_among(self, rig: str, key: str, receive: Receive) -> tuple[Waiting | None, Close]:
+        """The same, for what is sent with `put_among`."""
+        own = bus_key(rig, key)
+        if self._joint is None or not self._keyless:
+            return self.listen_waiting(own, receive)
+        alone = _Channel(self._session, alone_key(own), WAITING)
+        share = self._joint.receiver(key).add(rig, receive, alone.following)
+        ends = [self._keep(share), self._keep(alone)]
 
-        return take, self._keep(subscriber)
+        def close() -> None:
+            for end in ends:
+                end()
+
+        return share, close
+
+    def _joint_channel(self, key: str) -> Following:
+        channel = _Channel(self._session, key, JOINTS_WAITING)
+        self._kept.append(channel)
+        return channel.following
 
     def serve(self, key: str, answer: Answer) -> Close:
         """Answer queries to `key`, in a separate thread."""
@@ -328,15 +469,15 @@ class ZenohTransport:
     def close(self) -> None:
         """Take back everything declared, with the session if it is this transport's alone."""
         if self._leave is not None:
-            self._gathered.close()
+            self._common.burst.close()
             self._leave()
             return
-        if self._burst is not None:
-            self._burst.send()
+        if self._joint is not None:
+            self._joint.burst.send()
         with self._lock:
-            declared = [*self._kept, *(publisher for publisher, _ in self._publishers.values())]
-            self._kept.clear()
-            self._publishers.clear()
+            declared = [*self._kept]
+            for kept in (self._kept, self._lines, self._outlets):
+                kept.clear()
         for entity in declared:
             with contextlib.suppress(zenoh.ZError):
                 entity.undeclare()
@@ -354,13 +495,10 @@ class ZenohTransport:
         return close
 
 
-def _sender(sample: Any) -> str:
-    info = sample.source_info
-    return "" if info is None else str(info.source_id.zid)
-
-
-def _mark(sample: Any) -> bytes:
-    return b"" if sample.attachment is None else bytes(sample.attachment.to_bytes())
+def _received(sample: Any) -> Received:
+    info, mark = sample.source_info, sample.attachment
+    sender = "" if info is None else str(info.source_id.zid)
+    return sample.payload.to_bytes(), sender, b"" if mark is None else mark.to_bytes()
 
 
 def _direct(callback: Callable[[Any], None]) -> Any:

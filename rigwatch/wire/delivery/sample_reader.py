@@ -114,11 +114,15 @@ class SampleReader:
                 self._end_assumed()
         self._closers = [
             self._bus.watch_names(SOURCE_KEY, self._token),
-            self._inbox.follow(self._bus.transport, self._bus.key(SAMPLES.key), self._receive),
+            self._inbox.follow(self._bus, SAMPLES, self._receive),
         ]
 
     def __len__(self) -> int:
         return len(self._inbox)
+
+    def may_hold(self) -> bool:
+        """Whether something may have come: a look that costs less than the number of messages."""
+        return self._inbox.may_hold()
 
     @property
     def counters(self) -> Counters:

@@ -9,6 +9,9 @@ makes forty thousand: garbage of months would wait for that, in arenas that are 
 
 It also keeps up to two thousand freed tuples of each length, which a process that decodes messages
 gathers over months: half a megabyte to one. Only a collection of the old objects lets go of them.
+
+Python's own arenas, a megabyte each, are full after start-up: a passing need of some kilobytes
+takes another one, which fills over weeks and stays. Its room is taken at the start instead.
 """
 
 import contextlib
@@ -21,6 +24,12 @@ _TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8
 POOLS = 2
 LARGE = 1 << 17
 """Size from which a piece has pages of its own [bytes]; the library's, which otherwise grows."""
+ROOM, SMALL = 1 << 20, 460
+"""Room in Python's arenas beyond what start-up needs, and the objects that take it for a moment, of
+the largest kind that arenas hold [bytes].
+"""
+_kept: list[bytes] = []
+"""One of them: an arena without any would be given back."""
 TIDY_EVERY = 60.0
 """Time between two collections of everything [s]; with few new objects one takes under 1 ms."""
 
@@ -44,6 +53,8 @@ def settle_memory() -> None:
     as often as new garbage asks for.
     """
     gc.collect()
+    if not _kept:
+        _kept.append([bytes(SMALL) for _ in range(ROOM // SMALL)][-1])
     gc.freeze()
 
 

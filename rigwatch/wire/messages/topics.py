@@ -29,8 +29,10 @@ class Topic:
         recorded: whether the recorder keeps it.
         numbered: whether its publisher numbers and stores its messages, so that a listener gets
             each message once or a report of the missing ones.
-        owned_by: processes whose messages decide alarms: each has a key of its own, at which no
-            other role may send.
+        joined: whether a process of several rigs sends its messages as one with those of its other
+            rigs, to such processes: they are many.
+        owned_by: processes whose messages decide alarms, or what a recording lacks: each has a key
+            of its own, at which no other role may send.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Topic:
     rate_hz: float
     recorded: bool
     numbered: bool = False
+    joined: bool = False
     owned_by: tuple[str, ...] = ()
 
     def key_of(self, process: str) -> str:
@@ -52,13 +55,14 @@ class Topic:
         return (self.key, *map(self.key_of, self.owned_by))
 
 
-SAMPLES = Topic("samples", "daq/samples", SampleBlock, "daq", 256.0, recorded=True)
+SAMPLES = Topic("samples", "daq/samples", SampleBlock, "daq", 256.0, recorded=True, joined=True)
 ESTIMATES = Topic(
-    "estimates", "monitor/estimates", EstimateBlock, "monitor", 256.0, recorded=True, numbered=True
-)
+    "estimates", "monitor/estimates", EstimateBlock, "monitor", 256.0,
+    recorded=True, numbered=True, joined=True,
+)  # fmt: skip
 ALARMS = Topic("alarms", "monitor/alarms", Alarm, "monitor", 0.0, recorded=True, numbered=True)
 COMMANDS = Topic("commands", "monitor/commands", AlarmCommand, "operator", 0.0, recorded=True)
-GAPS = Topic("gaps", "gaps", Gap, "any", 0.0, recorded=True)
+GAPS = Topic("gaps", "gaps", Gap, "any", 0.0, recorded=True, owned_by=("recorder",))
 HEALTH = Topic("health", "health", Health, "any", 1.0, recorded=True, owned_by=("daq", "recorder"))
 EVENTS = Topic("events", "events", Event, "any", 0.0, recorded=True)
 RUN = Topic("run", "run", RunInfo, "recorder", 0.0, recorded=True)

@@ -119,10 +119,14 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
     if not any(row.effect in rarer and row.p_value < BY_CHANCE for row in rows):
         return _unless_named(first, f"nor is it like one of {len(rarer)} rarer ones")
     progress(f"no usual effect explains the error: trying {len(rarer)} rarer ones")
-    second = _explained_once(replace(bench, study=wider), progress)
+    rows = rank(wider, bench.data, bench.base, bench.floor, progress, known=first.rows)
+    none = f"nor does one of {len(rarer)} rarer ones"
+    if not any(row.effect in rarer and _may_replace(first, row) for row in rows):
+        return _unless_named(first, none)
+    second = _explained_once(replace(bench, study=wider), progress, rows)
     found = second.explanation
     if found.verdict not in STRENGTH_TOLD or found.remains or not _halves(first, second):
-        return _unless_named(first, f"nor does one of {len(rarer)} rarer ones")
+        return _unless_named(first, none)
     text = RARER.format(text=found.text, count=len(rarer))
     unlike = "; ".join([*filter(None, [found.unlike]), SECOND_PASS])
     doubted = replace(found, text=text, unlike=unlike, wrong_probability=None, wrong_at_most=None)
@@ -142,11 +146,15 @@ def _asks_for_rarer(found: Explained) -> bool:
     return not own_floor(bench.study, bench.data, bench.floor, best).reached(best.fitted.held_out)
 
 
+def _may_replace(first: Explained, row: Ranked) -> bool:
+    """Whether an effect leaves at most half the error of what was named before, if any was."""
+    named = first.explanation.verdict in STRENGTH_TOLD
+    return row.accepted and not (named and row.held_out_error > first.rows[0].held_out_error / 2)
+
+
 def _halves(first: Explained, second: Explained) -> bool:
     """Whether what is named leaves at most half the error of what was named before, if any was."""
-    if first.explanation.verdict not in STRENGTH_TOLD or second.explanation.beside:
-        return True
-    return second.rows[0].held_out_error <= first.rows[0].held_out_error / 2
+    return bool(second.explanation.beside) or _may_replace(first, second.rows[0])
 
 
 def tries_rarer(study: Study) -> bool:
@@ -168,9 +176,11 @@ def with_whole_library(study: Study) -> Study:
     return replace(study, file=structs.replace(study.file, whole_library=True))
 
 
-def _explained_once(bench: Bench, progress: Progress) -> Explained:
-    """The explanation by the effects that the study ranks."""
-    bench, rows, verdict = _ranked(bench, progress)
+def _explained_once(
+    bench: Bench, progress: Progress, ranked: list[Ranked] | None = None
+) -> Explained:
+    """The explanation by the effects that the study ranks; `ranked` if they have been."""
+    bench, rows, verdict = _ranked(bench, progress, ranked)
     bench = with_lower_floor(bench, rows)
     healthy = bench.data.healthy is not None
     if verdict.word in STRENGTH_TOLD and bench.data.along_motion and healthy:
@@ -227,13 +237,15 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
     return _ranked(bench, progress)[1:]
 
 
-def _ranked(bench: Bench, progress: Progress) -> tuple[Bench, list[Ranked], Verdict]:
-    """The study with its hold decided, its ranking, and the verdict."""
+def _ranked(
+    bench: Bench, progress: Progress, rows: list[Ranked] | None = None
+) -> tuple[Bench, list[Ranked], Verdict]:
+    """The study with its hold decided, its ranking, and the verdict; `rows` if it is ranked."""
     stopped = _stopped(bench)
     if stopped is not None:
         rows = rank_all(bench.study, bench.data, bench.base)
         return bench, rows, with_base_offered(bench, stopped)
-    rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
+    rows = rows or rank(bench.study, bench.data, bench.base, bench.floor, progress)
     decided = with_hold_decided(bench, rows, progress)
     bench, rows = decided.bench, decided.rows
     found, verdict = _judged(with_lower_floor(bench, rows), rows, progress)

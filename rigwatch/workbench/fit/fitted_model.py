@@ -34,6 +34,7 @@ from rigwatch.physics.engine.search import (
     continued_spread,
     convergence,
     fit_continued,
+    fit_nearby,
     has_hidden_states,
     kept_promise,
     multi_start_fit,
@@ -257,8 +258,9 @@ def _trained(  # noqa: PLR0917 -- the arguments of `fit_model`
     if search:
         best, ended = multi_start_fit(search)
         found = _settled(study, data, best, horizon, substeps)
-        ended = ended if found is best else at_other_values(ended, found)
-        return begun_anew_nearby(found, data.train, horizon, substeps), ended, horizon
+        if found is not best:
+            return found, at_other_values(ended, found), horizon
+        return begun_anew_nearby(best, data.train, horizon, substeps), ended, horizon
     free_run = study.model.states and not data.along_motion
     if free_run and (horizon >= LONG or from_short_horizons):
         begin = fit_over(horizon // SHORTER, start=begin).parameters
@@ -294,11 +296,14 @@ def _settled(study: Study, data: Data, found: Fit, horizon: int, substeps: int) 
     for placement in system.placements:
         strength = placement.effect.strength
         centre[placement.prefix + strength] = placement.effect.parameters[strength].neutral
-    judged = partial(_continued_error, recording=data.train, horizon=horizon, substeps=substeps)
-    hidden = has_hidden_states(system)
-    return untied(
-        found, data.train, horizon, centre, substeps, fit_continued, judged if hidden else None
+    fitted_to = data.train, horizon, substeps
+    untied_fit = untied(
+        found,
+        centre,
+        lambda at, prior: fit_nearby(at, prior, *fitted_to),
+        (lambda at: _continued_error(at, *fitted_to)) if has_hidden_states(system) else None,
     )
+    return found if untied_fit is found else begun_anew_nearby(untied_fit, *fitted_to)
 
 
 def _continued_error(found: Fit, recording: Recording, horizon: int, substeps: int) -> float:

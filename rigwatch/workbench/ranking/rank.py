@@ -47,6 +47,8 @@ def rank(
     base: Fitted,
     floor: NoiseFloor,
     progress: Progress = no_progress,
+    *,
+    known: Sequence[Ranked] = (),
 ) -> list[Ranked]:
     """All effects at all ports, best first; the most promising are fitted and judged.
 
@@ -54,8 +56,10 @@ def rank(
         study, data, base: the study, its recordings and the fitted model.
         floor: noise floor of the held-out recordings.
         progress: called with a line of text as each fit begins.
+        known: rows of an earlier ranking of fewer effects; what was fitted is not fitted again.
     """
     rows = scored(study, data, base, candidates(study, data.train))
+    _take_known(rows, known, base)
     denied = denied_sensors(study, data)
     for row in rows:
         if row.port in denied:
@@ -126,6 +130,18 @@ def _skipped_for_far_worse(rows: Sequence[Ranked]) -> list[Ranked]:
     far = {r.label for r in rows if r.fitted is not None and r.held_out_error > most}
     waiting = [r for r in rows if r.fitted is None and not r.failure and r.fitted_instead in far]
     return [r for r in waiting if same_family(best, r) and _may_be_it(r)]
+
+
+def _take_known(rows: Sequence[Ranked], known: Sequence[Ranked], base: Fitted) -> None:
+    """Store fits of an earlier ranking, of those that are fitted alone beside the base model."""
+    alone = {
+        row.label: row
+        for row in known
+        if row.fitted is not None and len(row.fitted.placements) == len(base.placements) + 1
+    }
+    for row in rows:
+        if row.label in alone:
+            row.take(alone[row.label])
 
 
 def _elsewhere(study: Study, data: Data, rows: Sequence[Ranked], floor: NoiseFloor) -> list[Ranked]:

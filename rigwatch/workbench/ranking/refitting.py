@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from itertools import product
 from typing import Any
 
 from rigwatch.physics.engine.compile import cores, side_by_side
 from rigwatch.physics.engine.equations import Placement
+from rigwatch.physics.engine.search import undetermined
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, NoiseFloor, lowered
 from rigwatch.workbench.fit import (
@@ -40,13 +40,17 @@ def refit(
         fitting: `fit_model` accepts the first minimum, `fit_with_retry` also searches elsewhere.
     """
     fits, failures = list[Fitted](), list[str]()
-    begun = _starts(study, data, base, row)
-    for placement, start in product(orders_at_port(study, base, row), begun):
+    ended, given = base.train.values() | row.begin(), _given_of_open(study, data, base)
+    for placement in orders_at_port(study, base, row):
         placements = (*base.placements, placement)
-        try:
-            fits.append(fitting(study, data, placements, start, base.train.scale, base=base))
-        except ModelError as error:
-            failures.append(str(error))
+        for start in (ended, ended | given) if given else (ended,):
+            try:
+                fits.append(fitting(study, data, placements, start, base.train.scale, base=base))
+            except ModelError as error:
+                failures.append(str(error))
+                continue
+            if given.keys().isdisjoint(undetermined(fits[-1].train)):
+                break
     if not fits:
         row.reason, row.failure = "cannot be fitted", failures[0]
         return
@@ -54,18 +58,16 @@ def refit(
     judge_fit(base, row)
 
 
-def _starts(study: Study, data: Data, base: Fitted, row: Ranked) -> list[dict[str, float]]:
-    """Initial values of a row's fits: where the base model ended, and from given values.
+def _given_of_open(study: Study, data: Data, base: Fitted) -> dict[str, float]:
+    """Given values of the parameters that a free run of the base model leaves open.
 
-    A parameter that a free run leaves open may have run off, as a heat capacity to infinity, from
-    where a fit with the effect that is missing does not come back.
+    They may have run off, as a heat capacity to infinity, from where a fit with the effect that is
+    missing does not come back: where it leaves them open too, it is begun from these as well.
     """
-    ended = base.train.values() | row.begin()
     if base.convergence is None or data.along_motion:
-        return [ended]
+        return {}
     own, given = study.model.parameters, study.file.start
-    again = {n: given.get(n, own[n].value) for n in base.convergence.undetermined if n in own}
-    return [ended, ended | again] if again else [ended]
+    return {n: given.get(n, own[n].value) for n in base.convergence.undetermined if n in own}
 
 
 def fit_started(known: Callable[[Study, Sequence[Placement]], Mapping[str, float]]) -> Fitting:
@@ -120,15 +122,22 @@ def fit_each(  # noqa: PLR0917 -- they belong together
         if any(_is_unlike(row, other) for other in enough):
             row.reason = f"unlike {enough[0].label}, which explains {EXPLAINED:.0%}; not fitted"
             continue
-        progress(f"fitting {row.label}, {number} of at most {len(rows)}")
-        if row.label not in ahead:
-            waiting = [r for r in rows[number - 1 :] if not any(_is_unlike(r, o) for o in enough)]
-            ahead = {each.label: replace(each) for each in waiting[: cores()]}
-            refit_all(study, data, base, list(ahead.values()), fit_model)
-        row.take(ahead[row.label])
+        if row.fitted is None:
+            progress(f"fitting {row.label}, {number} of at most {len(rows)}")
+            if row.label not in ahead:
+                waiting = _waiting(rows[number - 1 :], enough)
+                ahead = {each.label: replace(each) for each in waiting[: cores()]}
+                refit_all(study, data, base, list(ahead.values()), fit_model)
+            row.take(ahead[row.label])
         if row.accepted and leaves_nothing(row, base, own_floor(study, data, floor, row)):
             enough.append(row)
     return enough
+
+
+def _waiting(rows: Sequence[Ranked], enough: Sequence[Ranked]) -> list[Ranked]:
+    """Rows to be fitted, unless one of those that explain the error makes it needless."""
+    unfitted = [row for row in rows if row.fitted is None]
+    return [row for row in unfitted if not any(_is_unlike(row, other) for other in enough)]
 
 
 def own_floor(study: Study, data: Data, floor: NoiseFloor, row: Ranked) -> NoiseFloor:

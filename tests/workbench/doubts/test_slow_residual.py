@@ -82,6 +82,7 @@ def test_a_late_thermocouple_is_found_by_the_recordings_held_out(tmp_path: Path)
     found = explain(study)
     assert found.ranking[0].effect == "lag"
     assert found.ranking[0].port == "thermocouple"
+    assert "free_convection@loss" in found.beside, "still air carries heat off as well"
     assert 0.8 * WELL < found.ranking[0].parameters["tau"].value < 1.2 * WELL
 
 

@@ -76,7 +76,7 @@ def test_an_effect_of_a_set_is_compared_though_it_looks_like_another(tmp_path: P
     rest = Combination((stiffer["cubic_stiffness@load"],))
     beside = rank(with_rows(study, rest.rows), bench.data, rest.fitted, bench.floor)
     own = next(row for row in beside if row.fitted_instead and row.fitted is None)
-    found = {row.label: row for row in _ranked_with(bench, rest, own, bench.floor)}
+    found = {row.label: row for row in _ranked_with(bench, rest, own, rest, bench.floor)}
     assert found[own.label].fitted is not None
     assert found["coulomb@load"].accepted
 

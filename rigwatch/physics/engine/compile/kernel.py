@@ -127,6 +127,8 @@ class NativeKernel:
 
     def _compiled_along(self) -> tuple[int, int, int, int, int]:
         """The functions of `simulate`, compiled by the first thread that asks."""
+        if all(self._along):
+            return self._along
         # SymPy is not made for several threads at once.
         with alone(_COMPILING):
             if not all(self._along):

@@ -75,15 +75,23 @@ def balanced_states(model: Model) -> tuple[MeasuredState, ...]:
 
 
 def sensor_states(model: Model) -> frozenset[str]:
-    """Hidden states that no other state needs: what a sensor keeps of a signal, as its mean."""
+    """Hidden states that none but such states need: what a sensor keeps of a signal, as its mean.
+
+    An amplifier behind the sensor may keep something of what the sensor leaves.
+    """
     spelt = spelt_out(model)
     needed = {n: names_reached(spelt, s.derivative, "model") for n, s in spelt.states.items()}
     hidden = needed.keys() - {state.name for state in measured_states(model)}
-    return frozenset(
-        name
-        for name in hidden
-        if not any(name in used for other, used in needed.items() if other != name)
-    )
+    found, before = frozenset[str](), None
+    while found != before:
+        before = found
+        elsewhere = {n: used for n, used in needed.items() if n not in before}
+        found |= {
+            name
+            for name in hidden
+            if not any(name in used for other, used in elsewhere.items() if other != name)
+        }
+    return found
 
 
 def predicted_outputs(model: Model) -> tuple[str, ...]:

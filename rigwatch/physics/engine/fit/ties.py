@@ -11,8 +11,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from rigwatch.physics.engine.fit.recording import Recording
-from rigwatch.physics.engine.fit.windowed_fit import Fit, Prior, fit
+from rigwatch.physics.engine.fit.windowed_fit import Fit, Prior
 from rigwatch.wire.arrays import FloatArray
 
 LOOSE = 0.3
@@ -29,22 +28,18 @@ COSTS = 0.05
 """Relative rise of the error at which what seemed a tie is none: it is flat to first order only."""
 
 
-def untied(  # noqa: PLR0917 -- those of `fit`
+def untied(
     found: Fit,
-    recording: Recording,
-    horizon: int,
     centre: Mapping[str, float],
-    substeps: int,
-    refit: Callable[..., Fit] = fit,
+    nearby: Callable[[Fit, Prior], Fit],
     judged: Callable[[Fit], float] | None = None,
 ) -> Fit:
     """The fit with its ties resolved; unchanged if there are none.
 
     Args:
         found: the fit.
-        recording, horizon, substeps: as in `fit`.
         centre: prior means of the parameters, by name.
-        refit: `fit`, or another with the same arguments, by which it was found.
+        nearby: moves a fit to where a prior and the recording agree best.
         judged: error of a fit that must not rise; that of its scaled residuals if None.
 
     Raises:
@@ -65,10 +60,7 @@ def untied(  # noqa: PLR0917 -- those of `fit`
         # Of all equivalent parameters, those nearest to the prior means.
         basis = np.linalg.qr(flat / unit[:, None]).Q
         prior = Prior(about, _noise(found) * basis.T / unit)
-        tried = refit(
-            found.compiled, recording, horizon, start=found.parameters, scale=found.scale,
-            initial=found.initial, substeps=substeps, prior=prior,
-        )  # fmt: skip
+        tried = nearby(found, prior)
         if error(tried) > allowed:
             break
         found = tried

@@ -3,11 +3,16 @@
 search (ShortHorizons, WholeRuns) ──attempts──▶ multi_start_fit ──▶ Fit, Convergence
 """
 
-from rigwatch.physics.engine.search.continued_fit import begun_anew_nearby, fit_continued
+from rigwatch.physics.engine.search.continued_fit import (
+    begun_anew_nearby,
+    fit_continued,
+    fit_nearby,
+)
 from rigwatch.physics.engine.search.convergence import (
     Convergence,
     at_other_values,
     convergence,
+    undetermined,
 )
 from rigwatch.physics.engine.search.hidden_states import continued_spread, has_hidden_states
 from rigwatch.physics.engine.search.multi_start_fit import multi_start_fit
@@ -24,7 +29,9 @@ __all__ = [
     "continued_spread",
     "convergence",
     "fit_continued",
+    "fit_nearby",
     "has_hidden_states",
     "kept_promise",
     "multi_start_fit",
+    "undetermined",
 ]

@@ -82,6 +82,28 @@ def fit_continued(
 
 
 @QUIET
+def fit_nearby(found: Fit, prior: Prior, recording: Recording, horizon: int, substeps: int) -> Fit:
+    """A fit by `fit_continued`, moved to where a prior and the recording agree best.
+
+    It starts where the fit ended, and keeps its `begun_anew`.
+
+    Args:
+        found: fitted by `fit_continued`.
+        prior: as in `fit`.
+        recording, horizon, substeps: what it was fitted to.
+
+    Raises:
+        ModelError: the model diverges.
+    """
+    if found.continued:
+        return _ContinuedWindows(found, recording, horizon, substeps).fitted(prior)
+    return fit(
+        found.compiled, recording, horizon, start=found.parameters, scale=found.scale,
+        initial=found.initial, substeps=substeps, prior=prior,
+    )  # fmt: skip
+
+
+@QUIET
 def begun_anew_nearby(found: Fit, recording: Recording, horizon: int, substeps: int) -> Fit:
     """A continued fit whose `begun_anew` is the optimum nearest to its own parameters.
 
@@ -297,10 +319,9 @@ class _ContinuedWindows:
             if a window diverges.
         """
         m, hidden = self._m, self._hidden
-        initial, (error, slopes, ended, moved) = self._settled(parameters, rows, initial)
-        if not _finite(error, slopes):
+        initial, (error, slopes, ended, moved), tangent = self._settled(parameters, rows, initial)
+        if tangent is None:
             return None
-        tangent = self._tangent(slopes)
         by = slopes[..., m + hidden] @ turn
         by[..., :m] += slopes[..., :m]
         both = tangent.without(np.concatenate([error[..., None], by], axis=-1))
@@ -315,17 +336,25 @@ class _ContinuedWindows:
 
     def _settled(
         self, parameters: FloatArray, rows: IntArray, initial: FloatArray
-    ) -> tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray, FloatArray]]:
-        """Windows with their measured states moved by a Gauss-Newton step where it helps."""
+    ) -> tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray, FloatArray], Tangent | None]:
+        """Windows with their measured states moved by a Gauss-Newton step where it helps.
+
+        Returns:
+            Initial states; the windows from there, as `Problem.simulated_to_next`; their tangent,
+            None if a window diverges.
+        """
         problem, found = self._problem, self._problem.simulated_to_next(parameters, rows, initial)
         error, slopes = found[:2]
-        if not (len(self._shown) and _finite(error, slopes)):
-            return initial, found
-        step = self._tangent(slopes).solve(error[..., None])[..., 0]
+        if not _finite(error, slopes):
+            return initial, found, None
+        tangent = self._tangent(slopes)
+        if not len(self._shown):
+            return initial, found, tangent
+        step = tangent.solve(error[..., None])[..., 0]
         size = np.sum(error**2, axis=1)
         (moving,) = np.nonzero(problem.predicted_reduction(step, slopes) > ENOUGH * size)
         if not len(moving):
-            return initial, found
+            return initial, found, tangent
         there = np.clip(initial[moving] + step[moving], *problem.limits)
         tried = problem.simulated_to_next(parameters, rows[moving], there)
         finite = np.isfinite(tried[1]).all(axis=(1, 2)) & np.isfinite(tried[3]).all(axis=(1, 2))
@@ -334,7 +363,8 @@ class _ContinuedWindows:
         initial[moving[better]] = there[better]
         for kept, new in zip(found, tried, strict=True):
             kept[moving[better]] = new[better]
-        return initial, found
+        # What is not finite was not better, so that no window has diverged here.
+        return initial, found, self._tangent(found[1]) if better.any() else tangent
 
     def _tangent(self, slopes: FloatArray) -> Tangent:
         return Tangent(slopes[..., self._m :], [(np.arange(len(slopes)), self._shown)])
@@ -357,7 +387,7 @@ class _ContinuedWindows:
             covariance=covariance_of(jacobian, variance),
             error=residual.reshape(path.residual.shape),
             jacobian=jacobian.reshape(*path.residual.shape, m),
-            begun_anew=self._found,
+            begun_anew=self._found.begun_anew or self._found,
         )
 
 

@@ -87,7 +87,7 @@ def convergence(
         gradient,
         len(others) + 1,
         agreeing,
-        _undetermined(best),
+        undetermined(best),
         at_bound(best),
         begun,
         reason or _agreed(agreeing, len(others) + 1, near_noise=near_noise),
@@ -96,7 +96,7 @@ def convergence(
 
 def at_other_values(ended: Convergence, fitted: Fit) -> Convergence:
     """How a search ended, told of the parameters to which its ties were resolved."""
-    return replace(ended, undetermined=_undetermined(fitted), at_bound=at_bound(fitted))
+    return replace(ended, undetermined=undetermined(fitted), at_bound=at_bound(fitted))
 
 
 def _agreed(agreeing: int, starts: int, *, near_noise: bool) -> str:
@@ -170,7 +170,7 @@ def at_bound(fitted: Fit) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _undetermined(fitted: Fit) -> tuple[str, ...]:
+def undetermined(fitted: Fit) -> tuple[str, ...]:
     """Parameters in directions along which the error hardly changes, relative to their sizes."""
     names, jacobian = fitted.compiled.system.free, _jacobian(fitted)
     if not names:

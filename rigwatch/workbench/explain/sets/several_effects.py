@@ -34,9 +34,11 @@ from rigwatch.workbench.explain.verdict_calibration import Evidence
 from rigwatch.workbench.fit import Fitted
 from rigwatch.workbench.ranking import (
     EXPLAINED,
+    MATERIAL,
     MUCH_WORSE,
     Progress,
     Ranked,
+    fit_started,
     in_order,
     left_over,
     rank,
@@ -229,7 +231,7 @@ def _judge_each(
     for row, rest in rests:
         progress(f"judging {row.label} together with {_joined(rest.labels)}")
         floor = floor_of(bench, best.fitted)
-        ranking = _ranked_with(bench, rest, row, floor)
+        ranking = _ranked_with(bench, rest, row, best, floor)
         found = judge(rest.fitted, ranking, floor)
         other = found.best
         if other is not None and other.label != row.label:
@@ -240,13 +242,22 @@ def _judge_each(
     return None, parts
 
 
-def _ranked_with(bench: Bench, rest: Combination, row: Ranked, floor: NoiseFloor) -> list[Ranked]:
-    """All effects beside the rest of a set; the set's own is fitted, whichever it looks like."""
+def _ranked_with(
+    bench: Bench, rest: Combination, row: Ranked, best: Combination, floor: NoiseFloor
+) -> list[Ranked]:
+    """All effects beside the rest of a set; the set's own is fitted, whichever it looks like.
+
+    A fit of it that ends above that of the set is begun anew there: from the rest alone it ended in
+    another minimum.
+    """
     study = with_rows(bench.study, rest.rows)
     rows = rank(study, bench.data, rest.fitted, floor)
+    within, known = best.fitted.train_error * (1 + MATERIAL), best.fitted.train.values()
     for own in rows:
-        if own.label == row.label and own.fitted is None and not own.failure:
-            refit(study, bench.data, rest.fitted, own)
+        if own.label != row.label or own.failure:
+            continue
+        if own.fitted is None or own.fitted.train_error > within:
+            refit(study, bench.data, rest.fitted, own, fit_started(lambda *_: known))
     return in_order(rows)
 
 

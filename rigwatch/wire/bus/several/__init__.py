@@ -1,0 +1,17 @@
+"""The messages of a process of several rigs, sent together and those of a topic as one.
+
+    daq of many rigs ──┬── joined/daq/samples ──▶ monitor, recorder of many rigs
+                       └── rig/a/daq/samples ───▶ dashboard of rig a, if there is one
+    daq of rig b ──────┬── rig/b/daq/samples ───▶ monitor, recorder of rig b
+                       └── rig/b/daq/samples/alone ▶ monitor of many rigs, if there is one
+
+A message costs sender, router and receiver far more than its bytes. So a process of several rigs
+sends those of a moment as one, which only processes of several rigs receive. Whoever follows one
+rig listens at the rig's own key, where such a process sends as long as somebody is there.
+"""
+
+from rigwatch.wire.bus.several.joint_link import JointLink
+from rigwatch.wire.bus.several.joint_receiver import WAITING, Following, Received
+from rigwatch.wire.bus.several.joint_sender import Alone, Among, alone_key
+
+__all__ = ["WAITING", "Alone", "Among", "Following", "JointLink", "Received", "alone_key"]
