@@ -148,10 +148,12 @@ def _elsewhere(study: Study, data: Data, rows: Sequence[Ranked], floor: NoiseFlo
     """Unfitted rows with the best effect at other ports, if it leaves more than noise.
 
     Scores are along the base model's fit: where a drive clips its parameters may be so far off that
-    they speak for a sensor that clips, and that a fit from there ends in a local minimum.
+    they speak for a sensor that clips, and that a fit from there ends in a local minimum. What
+    shifts time is tried elsewhere in any case: of a machine whose laws do not change, a late drive
+    and a late sensor show the same.
     """
     best, left = _best_and_what_it_leaves(study, data, rows, floor)
-    if best is None or left <= floor.allowed:
+    if best is None or (left <= floor.allowed and not best.placement.effect.time_shift):
         return []
     return [r for r in rows if r.effect == best.effect and r.fitted is None and not r.failure]
 
