@@ -253,6 +253,10 @@ def test_the_gram_where_gravity_is_meant_gets_a_hint(unit: str) -> None:
     [
         pytest.param("m*9.81", "(a number has no unit: make it a parameter", id="a number"),
         pytest.param("load - 20", "(a number has no unit: make it a parameter", id="one taken off"),
+        pytest.param("max(load, 1000)", "(a number has no unit: make it", id="a bound"),
+        pytest.param(
+            "where(load > 3, load, 0)", "(a number has no unit: make it", id="one compared with"
+        ),
         pytest.param("m*position", "", id="neither"),
     ],
 )

@@ -15,6 +15,7 @@ from rigwatch.workbench.study.elements import with_element
 
 MODEL = shipped_models()["motor"]
 TAU, LIMIT, COMMAND, DT = 0.05, 4.0, 10.0, 0.01
+SPACING = np.full(100, DT)
 VALUES = {"drive_lag_tau": TAU, "drive_saturation_us": LIMIT, "drive_saturation_w": 1.0}
 
 
@@ -32,7 +33,7 @@ def led(*placements: Placement) -> np.ndarray:
     parameters = compile_system(system).vector(VALUES)
     inputs = np.full((100, 1), COMMAND)
     recall = RecordedEffectStates(
-        system, inputs, np.zeros((100, len(system.states))), DT, parameters
+        system, inputs, np.zeros((100, len(system.states))), SPACING, parameters
     )
     (column,) = recall.columns
     return recall.at(parameters)[column]
@@ -66,8 +67,9 @@ def test_what_follows_another_memory_is_not_led_by_the_inputs_alone():
     system = compose(MODEL, (LAG, placed("rate_limit")))
     inputs = np.full((100, 1), COMMAND)
     recall = RecordedEffectStates(
-        system, inputs, np.zeros((100, len(system.states))), DT, compile_system(system).parameters
-    )
+        system, inputs, np.zeros((100, len(system.states))), SPACING,
+        compile_system(system).parameters,
+    )  # fmt: skip
     names = list(system.states)
     assert [names[column] for column in recall.exact] == ["drive_lag_z"]
 

@@ -12,7 +12,13 @@ from rigwatch.commands.catalogue.effect_table import listed
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import Model, shipped_models
 from rigwatch.wire.typed_files.loading import parse
-from rigwatch.workbench.catalogue import effect_curves, inputs_of_run, model_report, text_plot
+from rigwatch.workbench.catalogue import (
+    draft_of_model,
+    effect_curves,
+    inputs_of_run,
+    model_report,
+    text_plot,
+)
 
 GUIDE = Path(__file__).parents[2] / "docs" / "models.md"
 SNIPPETS = re.findall(r"```toml\n(.*?)```", GUIDE.read_text("utf-8"), re.DOTALL)
@@ -34,13 +40,12 @@ outputs.speed = { unit = "m/s", expression = "v + a - b" }
 
 @pytest.mark.parametrize("text", SNIPPETS, ids=[s.split('"')[1] for s in SNIPPETS])
 def test_a_model_of_the_guide_can_work(text: str) -> None:
-    given = {"ambient": 293.0} if "ambient" in text else {}
-    assert model_report(parse(text, Model, "guide"), given).fine
+    assert model_report(parse(text, Model, "guide"), {}).fine
 
 
 @pytest.mark.parametrize("name", sorted(shipped_models()))
 def test_a_model_that_ships_can_work(name: str) -> None:
-    given = {"heated-block": {"ambient": 293.0}, "vessel": {"outside": 1e5}}.get(name, {})
+    given = {"outside": 1e5} if name == "vessel" else {}
     assert model_report(shipped_models()[name], given).fine
 
 
@@ -72,6 +77,34 @@ outputs.position = { unit = "mm", expression = "x" }
 
 def test_a_pressure_in_pascal_is_seen_in_a_position_and_what_it_does_not_move_is_not() -> None:
     assert model_report(parse(CYLINDER, Model, "cylinder"), {}).unseen == ("oil",)
+
+
+SURROUNDED = """
+name = "surrounded"
+summary = "A block that cools to its surroundings."
+inputs.ambient = { unit = "K" }
+inputs.wall = { unit = "degC" }
+states.T = { unit = "K", derivative = "(ambient + wall - 2*T)/tau", measured = "T", start = 280.0 }
+parameters.tau = { value = 5.0, unit = "s" }
+outputs.T = { unit = "K", expression = "T" }
+"""
+
+
+def test_surroundings_that_are_not_given_are_as_warm_as_the_machine() -> None:
+    report = model_report(parse(SURROUNDED, Model, "surrounded"), {"wall": 6.85 + 10.0})
+    assert report.inputs == {"ambient": pytest.approx(280.0), "wall": pytest.approx(16.85)}
+    assert report.run[0].y[-1] == pytest.approx(285.0, abs=0.1)
+
+
+def test_parameters_of_which_the_same_is_said_share_a_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "free.toml"
+    more = 'parameters.g = { value = 9.8, unit = "m/s^2", fixed = true }\n'
+    more += 'parameters.h = { value = 2.0, unit = "m", fixed = true }\n'
+    file.write_text(UNSEEN.replace('"-b/tau"', '"-b/tau*g/g*h/h"') + more)
+    main(["model", "check", str(file)])
+    assert "  g, h: fixed and without bounds" in capsys.readouterr().out
 
 
 NEVER_NEGATIVE = ("kg", "kg m^2", "m^2", "m^3", "ohm", "H", "J/K")
@@ -190,9 +223,12 @@ outputs.T = { unit = "degC", expression = "T" }
 def test_a_run_is_drawn_in_the_units_shown_and_absolute_factors_are_told(
     unit: str, told: tuple[str, ...], end: float
 ) -> None:
-    report = model_report(parse(WARM.replace("UNIT", unit), Model, "warm"), {})
+    text = WARM.replace("UNIT", unit)
+    report = model_report(parse(text, Model, "warm"), {})
     assert report.fine
     assert report.absolute == told
+    in_browser = [one.text for one in draft_of_model(text, "warm").problems]
+    assert any("that multiplies something" in said for said in in_browser) == bool(told)
     (curve,) = report.run
     assert curve.up == "T [degC]"
     assert curve.y[0] == pytest.approx(20.0)

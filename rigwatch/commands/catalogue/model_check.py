@@ -48,33 +48,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _lines(name: str, report: "ModelReport") -> list[str]:
-    from rigwatch.workbench.catalogue import variables_known
+    from rigwatch.workbench.catalogue import findings
 
     lines = [f"{name}: equations and units are consistent, every port is used in an equation"]
-    said = (
-        (report.unused, "used in no equation and at no port"),
-        (report.unseen, "no output depends on it, so no recording can determine it"),
-        (report.tied, "the outputs cannot distinguish it from another of these"),
-        (
-            report.start,
-            "no channel measures it: a fit estimates its initial value from the outputs",
-        ),
-        (
-            report.absolute,
-            "a temperature that multiplies something: 0 degC are 273.15 K; give a difference in K",
-        ),
-        (
-            report.unbounded,
-            "fixed and without bounds, so that a study may give it any value: low = 0.0 refuses a"
-            " negative one",
-        ),
-        (
-            report.unread,
-            "no effect of the library uses a variable of this name; theirs are"
-            f" {', '.join(sorted(variables_known()))}",
-        ),
-    )
-    lines += [f"  {one}: {what}" for names, what in said for one in names]
+    said = findings(report).values()
+    lines += [f"  {', '.join(names)}: {what}" for names, what in said if names]
     ports = ", ".join(f"{count} at {port}" for port, count in report.entering.items())
     lines += [f"  effects that suit its ports: {ports or 'none, as it has no ports'}"]
     return [*lines, *([f"  {report.trouble}"] if report.trouble else [])]

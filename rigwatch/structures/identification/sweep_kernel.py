@@ -6,7 +6,7 @@ addresses of functions, as in `engine.compile.integrator`.
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import across, call, input_rows, lateness, place
+from rigwatch.physics.engine.compile import across, call, input_rows, place
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel, part
 
@@ -64,7 +64,7 @@ def sweep(  # noqa: C901, PLR0917 -- a kernel
     ks, wide, pp = np.zeros((b.size, n, width)), np.empty((y.shape[1], width)), p.ctypes.data
     for k in range(count):
         _between(nominal, k, 0.0, xs)
-        place(u, k, 0.0, 0.0, hold, 1, dt, us)
+        place(u, k, 0, 0.0, 0.0, hold, 1, dt, us)
         for i in range(n):
             z[i] = xs[i]
             for j in range(width):
@@ -86,7 +86,7 @@ def sweep(  # noqa: C901, PLR0917 -- a kernel
             _add(dt, a[stage, :stage], ks, ss)
             share, t = c[stage], (first + k + c[stage]) * dt
             ks[stage] = 0.0
-            place(u, k, share, share, hold, 1, dt, us)
+            place(u, k, 0, share, share, hold, 1, dt, us)
             if apart:
                 if share < 1.0:
                     _between(nominal, k, 0.0, xs)
@@ -127,8 +127,8 @@ def forward(  # noqa: PLR0917 -- a kernel
     for i in range(n):
         z[i] = x[i]
         z[n + i * m + m - n + i] = 1.0
-    late = lateness(hold)
-    across(step, u, row, substeps, late, hold, 1, dt, p.ctypes.data, z, us, times)
+    none, room = np.empty(0, np.int64), np.empty(n)
+    across(step, 0, u, row, 0, substeps, hold, none, 1, dt, p.ctypes.data, z, us, times, room, room)
     for i in range(n):
         x[i] = z[i]
         for j in range(m):

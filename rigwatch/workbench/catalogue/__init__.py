@@ -8,8 +8,8 @@ saved.
 from rigwatch.workbench.catalogue.drafts import Draft, draft_of_effects, draft_of_model
 from rigwatch.workbench.catalogue.drawings import plotted, text_plot
 from rigwatch.workbench.catalogue.effect_curves import Curve, effect_curves
+from rigwatch.workbench.catalogue.findings import findings
 from rigwatch.workbench.catalogue.model_report import ModelReport, inputs_of_run, model_report
-from rigwatch.workbench.catalogue.port_report import variables_known
 from rigwatch.workbench.catalogue.problems import Problem
 
 __all__ = [
@@ -20,9 +20,9 @@ __all__ = [
     "draft_of_effects",
     "draft_of_model",
     "effect_curves",
+    "findings",
     "inputs_of_run",
     "model_report",
     "plotted",
     "text_plot",
-    "variables_known",
 ]

@@ -7,20 +7,10 @@ from pathlib import Path
 from rigwatch.physics.engine.equations import Effect, Model, parse_effects, parse_model
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.workbench.catalogue.effect_curves import Curve, effect_curves
+from rigwatch.workbench.catalogue.findings import SEVERE, findings
 from rigwatch.workbench.catalogue.model_report import ModelReport, inputs_of_run, model_report
 from rigwatch.workbench.catalogue.problems import Problem, problem, remark
 from rigwatch.workbench.steps import check_effect
-
-FINDINGS = {
-    "unused": "used in no equation and at no port",
-    "unseen": "no output depends on it, so no recording can determine it",
-    "tied": "the outputs cannot distinguish it from another of these",
-    "start": "no channel measures it: a fit estimates its initial value from the outputs",
-    "unbounded": "fixed and without bounds, so that a study may give it any value",
-    "unread": "no effect of the library uses a variable of this name",
-}
-"""Findings of a model's report, in words."""
-SEVERE = ("unused", "tied")
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +81,8 @@ def draft_of_model(text: str, name: str) -> Draft:
         return Draft((problem(error, text, name),), {}, ())
     problems = [
         remark(text, _table(model, one), told, severe=kind in SEVERE)
-        for kind, told in FINDINGS.items()
-        for one in getattr(report, kind)
+        for kind, (names, told) in findings(report).items()
+        for one in names
     ]
     if report.trouble:
         problems.append(Problem(0, 0, 0, report.trouble))

@@ -81,7 +81,7 @@ def _along(effect: Effect, time: FloatArray, wave: FloatArray, speed: FloatArray
     sizes = {name: float(np.sqrt(np.mean(wave**2))) or 1.0 for name in signals}
     sizes |= {"v": 2 * np.pi * sizes["x"], "dt": SAMPLED, "rate": 2 * np.pi * sizes["x"]}
     values = _values(effect.scaled(sizes))
-    spacing = float(time[1] - time[0])
+    spacing = np.full(len(time), time[1] - time[0])
     along = {TIME: time, LEFT: np.zeros_like(time), **signals}
     if effect.states:
         along |= EffectStates(effect, {TIME: time, **signals}, spacing, "linear").run(values)

@@ -31,7 +31,9 @@ from rigwatch.workbench.catalogue.port_report import entering, unread
 
 STEPS = (1.0, 0.1, 0.01, 0.0)
 """Sizes of the inputs that are not given, in their units as the file shows them; the first with
-which the run stays finite is used."""
+which the run stays finite is used. A temperature begins where the model's own does."""
+ROOM = 293.15
+"""Temperature of an input [K] where no state has one given."""
 MOST, FINEST, SETTLED = 4000, 20.0, 5.0
 """Most samples of a run, samples per fastest time constant, slowest time constants per run."""
 SHOWN = 1e-9
@@ -108,7 +110,7 @@ def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> 
     if not model.states:
         return told
     for step in STEPS:
-        given = dict.fromkeys(model.inputs, step) | dict(inputs)
+        given = dict.fromkeys(model.inputs, step) | _temperatures(model) | dict(inputs)
         time, outputs, slopes = _run(system, {n: _in_si(model, n, at) for n, at in given.items()})
         if np.isfinite(outputs).all() and np.isfinite(slopes).all():
             break
@@ -129,6 +131,18 @@ def inputs_of_run(model: Model, report: ModelReport) -> str:
     """The inputs of the run in words, such as "power = 1 kW"; empty without inputs or a run."""
     units = {name: own.shown or own.unit for name, own in model.inputs.items()}
     return ", ".join(f"{name} = {value:g} {units[name]}" for name, value in report.inputs.items())
+
+
+def _temperatures(model: Model) -> dict[str, float]:
+    """Values of the inputs that are temperatures, in the units in which they are shown.
+
+    One kelvin is no usual temperature: surroundings at it would draw the run to where nothing is.
+    """
+    kelvin = unit_of("K").dimension
+    own = (s.start for s in model.states.values() if unit_of(s.unit).dimension == kelvin)
+    start = next((given for given in own if given > 0), ROOM)
+    units = {name: unit_of(signal.shown or signal.unit) for name, signal in model.inputs.items()}
+    return {name: u.from_si(start) for name, u in units.items() if u.dimension == kelvin}
 
 
 def _in_si(model: Model, name: str, value: float) -> float:

@@ -13,7 +13,7 @@ Along the measured motion every candidate is fitted briefly, to the beginning of
 from dataclasses import dataclass, replace
 
 from rigwatch.physics.engine.equations import check_variants
-from rigwatch.physics.engine.fit import Recording
+from rigwatch.physics.engine.fit import Recording, of_parts
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.base_fit import Base
 from rigwatch.workbench.compare.base_step import AT_NOISE, BaseSearch, improves
@@ -108,4 +108,7 @@ def _split_healthy(healthy: Recording, horizon: int) -> Data:
 
 def _cut(whole: Recording, begin: int, end: int | None, parts: tuple[int, ...]) -> Recording:
     thinning = replace(whole.thinning, parts=parts) if whole.thinning else None
-    return Recording(whole.dt, whole.inputs[begin:end], whole.outputs[begin:end], thinning, parts)
+    own = whole.own_spacings[: len(parts)] if begin == 0 else whole.own_spacings[-len(parts) :]
+    dt, spacings = of_parts(own, parts)
+    inputs, outputs = whole.inputs[begin:end], whole.outputs[begin:end]
+    return Recording(dt, inputs, outputs, thinning, parts, spacings=spacings)

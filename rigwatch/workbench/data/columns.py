@@ -6,11 +6,8 @@ from itertools import combinations
 
 import numpy as np
 
-from rigwatch.physics.engine.fit import filled
+from rigwatch.physics.engine.fit import SAME_SPACING, filled
 from rigwatch.wire.arrays import FloatArray
-
-SAME_RATE = 1e-6
-"""Relative difference of the time between samples up to which it is the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +57,7 @@ def same(one: Columns, other: Columns) -> bool:
     """Whether two recordings have the same rate, channels and samples."""
     if len(one) != len(other) or set(one.values) != set(other.values):
         return False
-    if abs(one.dt - other.dt) > SAME_RATE * one.dt:
+    if abs(one.dt - other.dt) > SAME_SPACING * one.dt:
         return False
     return all(
         np.array_equal(values, other.values[name], equal_nan=True)

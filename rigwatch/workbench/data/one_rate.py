@@ -1,8 +1,9 @@
 """Resamples recordings to one sample rate: low-pass if the rate is reduced, then interpolation.
 
-Loggers without a common clock differ by fractions of a percent. Such recordings are resampled to
-the slowest rate among them. Larger differences are resampled only if the study gives `rate`, as
-that changes the signal content.
+Loggers without a common clock differ by fractions of a percent. Such recordings keep their rates:
+resampled, an input that is held would change between samples. Only what needs one rate for all, as
+a smoothing of the measured motion does, has them resampled to the slowest among them. Larger
+differences are resampled only if the study gives `rate`, as that changes the signal content.
 """
 
 import math
@@ -13,6 +14,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
+from rigwatch.physics.engine.fit import SAME_SPACING
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data.columns import Columns, bridged
@@ -36,6 +38,33 @@ RESAMPLED = "samples are at another rate than recorded"
 """How a recording is altered that is resampled."""
 
 
+def at_own_rates(tables: Sequence[Columns], names: Sequence[str]) -> list[str]:
+    """Remarks on recordings that keep their rates.
+
+    Args:
+        tables: the recordings.
+        names: of their sessions.
+
+    Raises:
+        ModelError: rates differ by more than clock tolerances.
+    """
+    rates = [1 / table.dt for table in tables]
+    _check_alike(rates, names)
+    slowest, fastest = min(rates), max(rates)
+    if fastest <= slowest * (1 + SAME_SPACING):
+        return []
+    return [f"{len(rates)} recordings of {slowest:.6g} to {fastest:.6g} Hz, each at its own rate"]
+
+
+def _check_alike(rates: Sequence[float], names: Sequence[str]) -> None:
+    for name, own in zip(names, rates, strict=True):
+        if abs(own / rates[0] - 1) > ALIKE:
+            raise ModelError(
+                f"{name}: found {own:g} Hz, expected {rates[0]:g} Hz as in {names[0]};"
+                f" `rate = {min(rates):g}` in the study puts all recordings on one rate"
+            )
+
+
 def on_one_rate(
     tables: Sequence[Columns],
     names: Sequence[str],
@@ -55,12 +84,9 @@ def on_one_rate(
     """
     found = [1 / table.dt for table in tables]
     target = rate or min(found)
+    if rate is None:
+        _check_alike(found, names)
     for name, own in zip(names, found, strict=True):
-        if rate is None and abs(own / found[0] - 1) > ALIKE:
-            raise ModelError(
-                f"{name}: found {own:g} Hz, expected {found[0]:g} Hz as in {names[0]};"
-                f" `rate = {min(found):g}` in the study puts all recordings on one rate"
-            )
         if rate is not None and own < rate * (1 - SAME):
             raise ModelError(
                 f"rate: found {rate:g} Hz, expected at most {own:g} Hz, the rate of {name}"

@@ -77,4 +77,4 @@ def _travel(speed: FloatArray, recording: Recording) -> FloatArray:
     """Displacement: the integral of a speed with its drift removed, shape (n,)."""
     ends = np.cumsum(recording.parts or (len(recording),))[:-1]
     pieces = np.split(np.nan_to_num(speed), ends)
-    return np.concatenate([detrend(np.cumsum(piece)) * recording.dt for piece in pieces])
+    return np.concatenate([detrend(np.cumsum(piece)) for piece in pieces]) * recording.spacing

@@ -11,14 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigwatch.physics.engine.equations import Input, Model, Output
-from rigwatch.physics.engine.fit import Recording, Thinning
+from rigwatch.physics.engine.fit import Recording, Thinning, of_parts
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError, nearest
 from rigwatch.workbench.data.columns import Columns, any_same, bridged
 from rigwatch.workbench.data.derived_ends import without_ends
 from rigwatch.workbench.data.next_rows import with_next_rows
-from rigwatch.workbench.data.one_rate import on_one_rate
+from rigwatch.workbench.data.one_rate import at_own_rates, on_one_rate
 from rigwatch.workbench.data.openings import without_openings
+from rigwatch.workbench.data.prediction import predicts_along_motion
 from rigwatch.workbench.data.recorded_columns import read_columns, with_derived
 from rigwatch.workbench.data.signal_units import check_unit
 from rigwatch.workbench.data.whole_windows import (
@@ -98,7 +99,7 @@ def prepare(study: Study) -> Data:
             samples are missing.
     """
     file, remarks = study.file, list[str]()
-    tables = _on_one_rate(study, _tables(study, remarks), remarks)
+    tables = _with_rates(study, _tables(study, remarks), remarks)
     altered = [word for group in tables.values() for table in group for word in table.altered]
     dt = tables["train"][0].dt
     horizon = max(round(file.horizon / dt) if file.horizon else _usual(tables, dt), 2)
@@ -163,20 +164,35 @@ def _with_recording_parameters(span: Span, table: Columns) -> Columns:
     return replace(table, values={**table.values, **known})
 
 
-def _on_one_rate(
-    study: Study, tables: Mapping[str, Sequence[Columns]], remarks: list[str]
+def _with_rates(
+    study: Study, tables: dict[str, list[Columns]], remarks: list[str]
 ) -> dict[str, list[Columns]]:
+    """The recordings at their own rates, or at one if the study needs that."""
     spans = (*study.file.train, *study.file.held_out, *study.file.healthy)
     whole = [table for group in tables.values() for table in group]
+    names = [span.session for span in spans]
+    if not _needs_one_rate(study):
+        remarks += at_own_rates(whole, names)
+        return tables
     kept = frozenset(
         study.file.channels.get(name, own.channel or name)
         for name, own in study.model.inputs.items()
         if study.model.held(name) == "zero"
     )
-    made, said = on_one_rate(whole, [span.session for span in spans], study.file.rate, kept)
+    made, said = on_one_rate(whole, names, study.file.rate, kept)
     remarks += said
     rest = iter(made)
     return {use: [next(rest) for _ in group] for use, group in tables.items()}
+
+
+def _needs_one_rate(study: Study) -> bool:
+    """Whether a study asks for a rate, or counts in samples what all recordings share.
+
+    That is a smoothing of the measured motion, a decimation, a period, or a healthy remainder.
+    """
+    file = study.file
+    counts = file.rate or file.thin or file.period or study.model.rough
+    return bool(counts) or predicts_along_motion(study)
 
 
 def _recording(
@@ -209,7 +225,8 @@ def _recording(
         _check_excitation(study.model, u, use)
     ends = [name for name, held in study.holds.items() if held.ends]
     passed = min(table.passed for table in tables)
-    made = Recording(tables[0].dt, u, y, thinning, parts, passed=passed, breaks=breaks)
+    dt, spacings = of_parts([table.dt for table in tables], parts)
+    made = Recording(dt, u, y, thinning, parts, passed=passed, breaks=breaks, spacings=spacings)
     return with_next_rows(study.model, made, ends)
 
 

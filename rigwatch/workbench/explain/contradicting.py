@@ -9,10 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigwatch.workbench.data import NoiseFloor
-from rigwatch.workbench.explain.indistinguishable import same_family
 from rigwatch.workbench.explain.remaining_error import LITTLE, explains, shows_little_of_it
 from rigwatch.workbench.fit import Fitted
-from rigwatch.workbench.ranking import MATERIAL, Ranked, difference
+from rigwatch.workbench.ranking import MATERIAL, Ranked, difference, same_family
 
 CONTRADICTED = 2.0
 """Ratio of the training energy explained by another effect above which the best is in doubt."""

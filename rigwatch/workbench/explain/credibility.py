@@ -8,7 +8,8 @@ What `add` refused in the study's present state is not named as missing: there t
 anew with the effect, and lost what a single fit had gained.
 
 Nor is an effect that leaves most of the training of logs that are resampled where an input is held:
-it changes between two new samples, and a controller that saturates does not feel its mean.
+it changes between two new samples, and a controller that saturates does not feel its mean. That
+concerns studies that ask for one rate; in others each log keeps its own.
 """
 
 from collections.abc import Sequence
@@ -25,7 +26,7 @@ STRONGER = 3.0
 """Smallest ratio of an effect's strength to its apparent strength on the healthy recording."""
 RESAMPLED_HELD = (
     "so little may be what resampling makes of a held input, which then changes between samples:"
-    " log all recordings at one rate"
+    " log all recordings at one rate, or leave out what asks for one (rate, thin, period)"
 )
 
 

@@ -12,7 +12,14 @@ import numpy as np
 from rigwatch.physics.engine.score import ALIKE
 from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.fit import block_differences
-from rigwatch.workbench.ranking import MATERIAL, MUCH_WORSE, SAME, SIMILAR, Ranked
+from rigwatch.workbench.ranking import (
+    MATERIAL,
+    MUCH_WORSE,
+    SAME,
+    SIMILAR,
+    Ranked,
+    same_family,
+)
 
 EQUAL = 2.0
 """Standard deviations by which an effect must be ahead of another, block by block, to rule it out.
@@ -171,12 +178,6 @@ def as_near_as_own_error(
         and floor.ratio(row.fitted.held_out) ** 2 < most
         and floor.reached(row.fitted.held_out)
     )
-
-
-def same_family(best: Ranked, row: Ranked) -> bool:
-    """Whether both belong to one family of the library."""
-    family = best.placement.effect.family
-    return bool(family) and row.placement.effect.family == family
 
 
 def _is_simple_enough(best: Ranked, row: Ranked) -> bool:

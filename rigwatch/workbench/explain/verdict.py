@@ -29,7 +29,6 @@ from rigwatch.workbench.explain.indistinguishable import (
     at_other_ports,
     equal,
     lead,
-    same_family,
     undistinguished,
 )
 from rigwatch.workbench.explain.remaining_error import (
@@ -41,7 +40,7 @@ from rigwatch.workbench.explain.remaining_error import (
 )
 from rigwatch.workbench.explain.verdict_calibration import CLEAR, Evidence, probability_wrong
 from rigwatch.workbench.fit import Fitted
-from rigwatch.workbench.ranking import MATERIAL, NEAR, Ranked
+from rigwatch.workbench.ranking import MATERIAL, NEAR, Ranked, same_family
 
 Word = Literal[
     "nothing_missing", "missing_effect", "undetermined", "unknown_effect", "model_inadequate"

@@ -63,7 +63,7 @@ class BoundednessTest:
         healthy = self._healthy
         far = INITIAL_STATES * np.array(list(self._states.values()))
         run = fitted.compiled.simulate(
-            MOTION_GAIN * healthy.inputs, healthy.dt, np.zeros(3, np.int64), len(healthy),
+            MOTION_GAIN * healthy.inputs, healthy.spacing, np.zeros(3, np.int64), len(healthy),
             initial=np.stack([0 * far, far, -far]), parameters=fitted.train.parameters,
             substeps=fitted.substeps,
         )  # fmt: skip
@@ -84,7 +84,7 @@ def _state_sizes(fitted: Fitted, recording: Recording) -> dict[str, float]:
     shown = structs.replace(model, parameters=parameters, ports=ports, outputs=outputs)
     compiled = compile_system(compose(shown))
     run = compiled.simulate(
-        recording.inputs, recording.dt, np.zeros(1, np.int64), len(recording),
+        recording.inputs, recording.spacing, np.zeros(1, np.int64), len(recording),
         initial=np.zeros((1, len(model.states))), parameters=compiled.parameters,
         substeps=fitted.substeps,
     )  # fmt: skip

@@ -49,10 +49,10 @@ def _near_jumps(fitted: Fit, recording: Recording) -> BoolArray:
     ]
     if not able:
         return near
-    states = initial_states(system, recording)
+    states, spacing = initial_states(system, recording), recording.spacing
     for placement in able:
         effect = placement.effect
-        signals = port_signals(system, placement, recording.inputs, states, recording.dt, values)
+        signals = port_signals(system, placement, recording.inputs, states, spacing, values)
         own = {name: values[placement.prefix + name] for name in effect.parameters}
         pushed = evaluated(effect.expression, signals, own, str(placement))
         sudden = np.abs(np.diff(pushed)) > JUMP * np.max(np.abs(pushed))

@@ -382,9 +382,9 @@ def eigenvalues(fitted: Fitted, recording: Recording) -> ComplexArray:
     starts = cut.starts[:LOOKED_AT]
     # Without states of its own a model has an initial state for each recording, and one window.
     run = fitted.compiled.linearise(
-        recording.inputs, recording.dt, starts, 2,
+        recording.inputs, recording.spacing, starts, 2,
         initial=fitted.train.initial[: len(starts)], parameters=fitted.train.parameters,
-        substeps=fitted.substeps,
+        substeps=fitted.substeps, begins=recording.begins,
     )  # fmt: skip
     free, n = len(fitted.compiled.system.free), run.states.shape[2]
     slopes = run.rate_slopes[:, 0, :, free : free + n]

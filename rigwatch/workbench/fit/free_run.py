@@ -19,8 +19,9 @@ def free_run(fitted: Fitted, recording: Recording) -> FloatArray:
         if state.rate_of and not state.measured:
             first[index] = 0.0
     run = compiled.simulate(
-        recording.inputs, recording.dt, np.zeros(1, np.int64), len(recording),
+        recording.inputs, recording.spacing, np.zeros(1, np.int64), len(recording),
         initial=first[None], parameters=fitted.train.parameters, substeps=fitted.substeps,
+        begins=recording.begins,
     )  # fmt: skip
     error = recording.outputs - run.outputs[0]
     return np.asarray(np.sqrt(np.nanmean(error**2, axis=0)))

@@ -83,7 +83,7 @@ def search_scales(
         substeps: Runge-Kutta steps between samples.
     """
     run = compiled.simulate(
-        recording.inputs, recording.dt, np.zeros(1, np.int64), len(recording),
+        recording.inputs, recording.spacing, np.zeros(1, np.int64), len(recording),
         initial=np.zeros((1, len(compiled.system.states))), parameters=at, substeps=substeps,
     )  # fmt: skip
     low, high = bounds(compiled.system)

@@ -21,7 +21,14 @@ from rigwatch.workbench.ranking.nested_start import refit_nested
 from rigwatch.workbench.ranking.paired_test import difference
 from rigwatch.workbench.ranking.proportion import denies_gain
 from rigwatch.workbench.ranking.rank import AGAIN, MUCH_WORSE, rank
-from rigwatch.workbench.ranking.ranked import SAME, SIMILAR, Ranked, accepted_from, in_order
+from rigwatch.workbench.ranking.ranked import (
+    SAME,
+    SIMILAR,
+    Ranked,
+    accepted_from,
+    in_order,
+    same_family,
+)
 from rigwatch.workbench.ranking.refinements import (
     promises_more,
     refinements,
@@ -73,6 +80,7 @@ __all__ = [
     "refinements",
     "refit",
     "refit_nested",
+    "same_family",
     "score_all",
     "scored",
     "select_for_fit",

@@ -39,7 +39,7 @@ def proportion(recording: Recording, rate: int) -> Proportion | None:
     """
     ends = np.cumsum(recording.parts or (len(recording),))[:-1]
     parts = np.split(recording.inputs[:, rate], ends)
-    derived = np.concatenate([np.gradient(part, recording.dt) for part in parts])
+    derived = np.concatenate([np.gradient(part) for part in parts]) / recording.spacing
     measured = recording.outputs[:, 0]
     valid = np.isfinite(measured)
     if int(valid.sum()) < LEAST:

@@ -13,8 +13,9 @@ from rigwatch.workbench.fit import Fitted, fit_model, fit_with_retry
 from rigwatch.workbench.ranking.acceptance import NEAR
 from rigwatch.workbench.ranking.candidates import candidates
 from rigwatch.workbench.ranking.fit_selection import LEVEL, select_for_fit
-from rigwatch.workbench.ranking.ranked import SAME, Ranked, in_order
+from rigwatch.workbench.ranking.ranked import SAME, Ranked, in_order, same_family
 from rigwatch.workbench.ranking.refitting import (
+    Fitting,
     Progress,
     fit_each,
     fit_from,
@@ -74,15 +75,7 @@ def rank(
         least = AGAIN * floor.above(base.train)
         likely = [row for row in chosen if row.explained > least]
         refit_elsewhere(study, data, base, likely, progress)
-    while spare := _substitute_of_failed(rows):
-        progress(f"fitting {spare.label}, as the effect it resembles cannot be fitted")
-        refit(study, data, base, spare, fit_model if enough else fit_with_retry)
-    while spare := _substitute_of_vague(rows):
-        progress(f"fitting {spare.label}, as the strength of the effect it resembles is open")
-        refit(study, data, base, spare, fit_model)
-    for spare in _substitutes_of_refused(base, rows):
-        progress(f"fitting {spare.label}, as the effect it resembles is refused")
-        refit(study, data, base, spare, fit_model)
+    _fit_skipped(study, data, base, rows, progress, fit_model if enough else fit_with_retry)
     while similar := _unfitted_similar(rows, floor):
         progress(f"fitting {similar.label}, which resembles the best")
         refit(study, data, base, similar, fit_model if enough else fit_with_retry)
@@ -93,6 +86,50 @@ def rank(
         progress(f"fitting {other.label}, as the best at its port leaves more than noise")
         refit(study, data, base, other, fit_model)
     return in_order(rows)
+
+
+def _fit_skipped(  # noqa: PLR0917 -- they belong together
+    study: Study,
+    data: Data,
+    base: Fitted,
+    rows: Sequence[Ranked],
+    progress: Progress,
+    first: Fitting,
+) -> None:
+    """Fit effects that were skipped for others which then do not stand for them.
+
+    Args:
+        study, data, base, rows, progress: as in `rank`.
+        first: fits what stands for an effect that cannot be fitted.
+    """
+    while spare := _substitute_of_failed(rows):
+        progress(f"fitting {spare.label}, as the effect it resembles cannot be fitted")
+        refit(study, data, base, spare, first)
+    while spare := _substitute_of_vague(rows):
+        progress(f"fitting {spare.label}, as the strength of the effect it resembles is open")
+        refit(study, data, base, spare, fit_model)
+    for spare in _substitutes_of_refused(base, rows):
+        progress(f"fitting {spare.label}, as the effect it resembles is refused")
+        refit(study, data, base, spare, fit_model)
+    for spare in _skipped_for_far_worse(rows):
+        progress(f"fitting {spare.label}, as what it resembles leaves far more than the best")
+        refit(study, data, base, spare, fit_model)
+
+
+def _skipped_for_far_worse(rows: Sequence[Ranked]) -> list[Ranked]:
+    """Unfitted rows of the best's family, skipped for one that leaves much more than the best.
+
+    A delay of the drive resembles a lag there to first order. If the best is the sensor's delay,
+    that is as good, and the lag is not, the drive's must be tried, too.
+    """
+    accepted = in_order([row for row in rows if row.accepted])
+    if not accepted:
+        return []
+    best = accepted[0]
+    most = MUCH_WORSE * best.held_out_error
+    far = {r.label for r in rows if r.fitted is not None and r.held_out_error > most}
+    waiting = [r for r in rows if r.fitted is None and not r.failure and r.fitted_instead in far]
+    return [r for r in waiting if same_family(best, r) and _may_be_it(r)]
 
 
 def _take_known(rows: Sequence[Ranked], known: Sequence[Ranked], base: Fitted) -> None:
@@ -111,10 +148,12 @@ def _elsewhere(study: Study, data: Data, rows: Sequence[Ranked], floor: NoiseFlo
     """Unfitted rows with the best effect at other ports, if it leaves more than noise.
 
     Scores are along the base model's fit: where a drive clips its parameters may be so far off that
-    they speak for a sensor that clips, and that a fit from there ends in a local minimum.
+    they speak for a sensor that clips, and that a fit from there ends in a local minimum. What
+    shifts time is tried elsewhere in any case: of a machine whose laws do not change, a late drive
+    and a late sensor show the same.
     """
     best, left = _best_and_what_it_leaves(study, data, rows, floor)
-    if best is None or left <= floor.allowed:
+    if best is None or (left <= floor.allowed and not best.placement.effect.time_shift):
         return []
     return [r for r in rows if r.effect == best.effect and r.fitted is None and not r.failure]
 

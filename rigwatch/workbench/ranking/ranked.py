@@ -97,6 +97,12 @@ class Ranked:
         return self.fitted.held_out_error if self.fitted else float("inf")
 
 
+def same_family(best: Ranked, row: Ranked) -> bool:
+    """Whether both belong to one family of the library."""
+    family = best.placement.effect.family
+    return bool(family) and row.placement.effect.family == family
+
+
 def row_of(candidate: Candidate, found: Standing, kind: str) -> Ranked:
     """The row of a scored, not yet fitted effect; `kind` is that of its port."""
     return Ranked(

@@ -63,12 +63,14 @@ def _along(data: Data, base: Fitted, found: Sequence[Candidate]) -> tuple[FloatA
     cut = windows(base.compiled.system, len(recording), base.horizon)
     substeps = nodes(base, recording)
     at = trajectory(
-        base.compiled, recording.inputs, recording.dt, cut.starts, cut.length,
+        base.compiled, recording.inputs, recording.spacing, cut.starts, cut.length,
         initial=fitted.initial, parameters=fitted.parameters, substeps=substeps,
+        begins=recording.begins,
     )  # fmt: skip
     run = base.compiled.simulate(
-        recording.inputs, recording.dt, cut.starts, cut.length,
+        recording.inputs, recording.spacing, cut.starts, cut.length,
         initial=fitted.initial, parameters=fitted.parameters, substeps=substeps,
+        begins=recording.begins,
     )  # fmt: skip
     scale = fitted.scale[:, None]
     return directions(at, found) / scale, run.slopes / scale

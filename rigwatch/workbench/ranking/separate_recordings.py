@@ -82,8 +82,9 @@ def check_ports(study: Study) -> None:
 
 def _pieces(recording: Recording) -> list[Recording]:
     ends = np.cumsum(recording.parts)[:-1]
-    pairs = zip(np.split(recording.inputs, ends), np.split(recording.outputs, ends), strict=True)
-    return [Recording(recording.dt, u, y, parts=(len(u),)) for u, y in pairs]
+    inputs, outputs = np.split(recording.inputs, ends), np.split(recording.outputs, ends)
+    pieces = zip(recording.own_spacings, inputs, outputs, strict=True)
+    return [Recording(dt, u, y, parts=(len(u),)) for dt, u, y in pieces]
 
 
 def _fits(base: Fitted, parts: int) -> list[Fitted]:

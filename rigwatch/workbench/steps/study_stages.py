@@ -77,10 +77,12 @@ def signals(stage: Stage, *, held_out: bool = True) -> Signals:
     """Measured and modelled outputs at every sample of the held-out or training recordings."""
     data, base = stage.bench.data, stage.bench.base
     whole = data.held_out if held_out else data.train
-    recording = Recording(whole.dt, whole.inputs, whole.outputs, parts=whole.parts)
+    recording = Recording(
+        whole.dt, whole.inputs, whole.outputs, parts=whole.parts, spacings=whole.spacings
+    )
     horizon = data.horizon if stage.bench.study.model.states else len(recording)
     residual = evaluate(base.train, recording, horizon, base.substeps).residuals
     flat = residual.reshape(-1, residual.shape[-1])
     measured = recording.outputs[: len(flat)]
-    time = np.arange(len(flat), dtype=np.float64) * recording.dt
+    time = np.concatenate([[0.0], np.cumsum(recording.spacing)[: len(flat) - 1]])
     return Signals(time, measured, measured - flat)

@@ -180,7 +180,7 @@ def test_of_many_logs_a_quarter_is_held_out_spread_over_them_and_remarks_come_on
     assert 5 not in held_out
     said = capsys.readouterr().err.splitlines()
     assert said.count("log00.csv and 15 more: goal: no unit in its header, assumed rad") == 1
-    assert sum("Hz, resampled to" in line for line in said) == 1
+    assert sum("Hz, each at its own rate" in line for line in said) == 1
     assert sum("are not counted" in line for line in said) <= 2
 
 

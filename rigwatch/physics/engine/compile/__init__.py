@@ -14,7 +14,7 @@ from rigwatch.physics.engine.compile.compiled_system import (
     compile_system,
 )
 from rigwatch.physics.engine.compile.derivatives import derivative
-from rigwatch.physics.engine.compile.integrator import across, call, input_rows, lateness, place
+from rigwatch.physics.engine.compile.integrator import across, call, input_rows, place
 from rigwatch.physics.engine.compile.resolved_rates import rate_limit, resolved, resolved_from
 from rigwatch.physics.engine.compile.stability import even_substeps
 from rigwatch.physics.engine.compile.static_kernel import evaluated, numpy_function
@@ -34,7 +34,6 @@ __all__ = [
     "evaluated",
     "even_substeps",
     "input_rows",
-    "lateness",
     "numpy_function",
     "on_all_cores",
     "place",

@@ -46,7 +46,7 @@ class Linearisation:
     With m free parameters, n states and q probes, the last axis of the slopes is (m, n, q).
 
     Attributes:
-        spacing: time between nodes [s].
+        spacing: time from each node to the next, shape (windows, nodes) [s].
         substeps: nodes per sample.
         states: shape (windows, nodes, n).
         rate_slopes: shape (windows, nodes, n, m + n + q): ∂rates.
@@ -56,7 +56,7 @@ class Linearisation:
             states after an update by those before; shape (windows, 0, …) without sampled states.
     """
 
-    spacing: float
+    spacing: FloatArray
     substeps: int
     states: FloatArray
     rate_slopes: FloatArray
@@ -80,7 +80,7 @@ class CompiledSystem:
     def simulate(
         self,
         inputs: FloatArray,
-        dt: float,
+        dt: float | FloatArray,
         starts: IntArray,
         length: int,
         *,
@@ -89,12 +89,13 @@ class CompiledSystem:
         substeps: int = 4,
         finest: int = FINEST,
         rows: int = 1,
+        begins: IntArray | None = None,
     ) -> Simulation:
         """Simulate windows of the inputs, each from its own initial state.
 
         Args:
             inputs: shape (samples, inputs).
-            dt: time between samples [s].
+            dt: time from each sample of the inputs to the next, shape (samples,), or of all [s].
             starts: first sample of each window, shape (windows,).
             length: samples in each window.
             initial: shape (windows, states).
@@ -102,15 +103,17 @@ class CompiledSystem:
             substeps: Runge-Kutta steps between samples.
             finest: most steps between samples for stiff effects or models, see `step_size`.
             rows: number of input rows per change of a held input, for inputs at finer nodes.
+            begins: first sample of the recording that each belongs to, before which held inputs
+                have not changed, shape (samples,); the first of all if None.
 
         Raises:
             ModelError: a window extends beyond the inputs, or a shape is wrong.
         """
         outputs = np.empty((len(starts), length, len(self.system.outputs)))
         slopes = np.empty((*outputs.shape, self.columns))
-        needed = min(finest, steps_for(self.system, self._rates, parameters, dt))
+        needed = min(finest, steps_for(self.system, self._rates, parameters, float(np.max(dt))))
         steps = max(substeps, needed)
-        arguments = self._arguments(inputs, dt, starts, length, initial, parameters, steps)
+        arguments = self._arguments(inputs, dt, begins, starts, length, initial, parameters, steps)
         n = len(self.system.states)
         last = np.empty((len(starts), n * (1 + self.columns)))
         self.kernel.simulate(*arguments, outputs, slopes, last, rows, finest)
@@ -138,6 +141,12 @@ class CompiledSystem:
             for name, own in model.inputs.items()
         ])  # fmt: skip
 
+    @cached_property
+    def _late(self) -> list[int]:
+        """Columns of the inputs that arrive late by parameters, in the order of the kernel's."""
+        names = list(self.system.model.inputs)
+        return [names.index(own.name) for own in self.system.delayed.values()]
+
     @property
     def columns(self) -> int:
         """Number of free parameters and states, by which outputs are differentiated."""
@@ -146,16 +155,19 @@ class CompiledSystem:
     def linearise(
         self,
         inputs: FloatArray,
-        dt: float,
+        dt: float | FloatArray,
         starts: IntArray,
         length: int,
         *,
         initial: FloatArray,
         parameters: FloatArray,
         substeps: int = 4,
+        begins: IntArray | None = None,
     ) -> Linearisation:
         """The trajectory of `simulate` with its Jacobians; same arguments and errors."""
-        arguments = self._arguments(inputs, dt, starts, length, initial, parameters, substeps)
+        arguments = self._arguments(
+            inputs, dt, begins, starts, length, initial, parameters, substeps
+        )
         n, wide = len(self.system.states), self.columns + len(self.system.probes)
         nodes = (len(starts), (length - 1) * substeps + 1)
         samples = (len(starts), length, len(self.system.outputs))
@@ -164,12 +176,15 @@ class CompiledSystem:
         count = length if self.system.updates else 0
         updates = np.zeros((len(starts), count, n, wide))
         self.kernel.linearise(*arguments, states, rates, outputs, reads, updates)
-        return Linearisation(dt / substeps, substeps, states, rates, reads, outputs, updates)
+        rows = starts[:, None] + np.arange(nodes[1]) // substeps
+        spacing = arguments[1][rows] / substeps
+        return Linearisation(spacing, substeps, states, rates, reads, outputs, updates)
 
     def _arguments(  # noqa: PLR0917 -- they stand in the order of the kernel's
         self,
         inputs: FloatArray,
-        dt: float,
+        dt: float | FloatArray,
+        begins: IntArray | None,
         starts: IntArray,
         length: int,
         initial: FloatArray,
@@ -194,7 +209,14 @@ class CompiledSystem:
         first = first.reshape(len(starts), len(self.system.states))
         values = np.ascontiguousarray(parameters, np.float64)
         driven = np.ascontiguousarray(inputs, np.float64)
-        return (driven, dt, substeps, self.hold, starts, first, values)
+        hold = self.hold
+        if self._late:
+            driven = np.column_stack([driven[:, self._late], driven])
+            hold = np.concatenate([hold[self._late], hold])
+        spacing = np.ascontiguousarray(np.broadcast_to(dt, len(inputs)), np.float64)
+        if begins is None:
+            begins = np.zeros(len(inputs), np.int64)
+        return (driven, spacing, begins, substeps, hold, starts, first, values)
 
     def vector(self, values: Mapping[str, float]) -> FloatArray:
         """All parameters, with those in `values` replaced; shape (n_p,).

@@ -7,6 +7,10 @@ The state is z = [x | S], the states followed by the rows of their sensitivities
 is integrated by the classical fourth-order Runge-Kutta method with fixed steps. The equations, and
 a whole step of them (`runge_kutta_step`), are passed as addresses of functions void(double t,
 double* a, u, p, out, slopes), so these loops are compiled once for all systems.
+
+A zero-order hold that is late by d samples changes within an interval. Steps end there, and where d
+is a parameter the sensitivities to it change by what the rates were before less what they are
+after: a change that comes later leaves the value before in force for as long.
 """
 
 import math
@@ -64,33 +68,44 @@ def input_rows(u: FloatArray, count: int) -> FloatArray:
 
 
 @part(error_model="numpy")
+def whole_samples(held: float) -> float:
+    """Whole samples by which a hold is late; what is left of a late one is above 0, and up to 1."""
+    return max(math.ceil(-held) - 1.0, 0.0)
+
+
+@part(error_model="numpy")
 def place(  # noqa: PLR0917 -- a kernel
-    u: FloatArray, row: int, at: float, inside: float, hold: FloatArray, rows: int, dt: float,
-    us: FloatArray,
+    u: FloatArray, row: int, oldest: int, at: float, inside: float, hold: FloatArray, rows: int,
+    dt: float, us: FloatArray,
 ) -> None:  # fmt: skip
     """Inputs between two samples, and the time until held inputs change.
 
     `hold` is 1 for a linear input, 0 for a zero-order hold, and -d for a zero-order hold delayed by
-    a share d of a sample. `inside`: a step ending at a change uses the value before it.
+    d samples; before row `oldest` it has the value of that row. `inside`: a step ending at a change
+    uses the value before it.
     """
     # The entry after the inputs is the time until held inputs change.
     us[u.shape[1]] = 0.0
     for j in range(u.shape[1]):
-        us[j] = u[row, j]
+        if hold[j] > 0.0:
+            us[j] = u[row, j]
+            if at > 0.0:
+                us[j] += at * (u[row + 1, j] - u[row, j])
+            continue
+        behind = whole_samples(hold[j])
+        change = -hold[j] - behind
+        us[u.shape[1]] = (rows - row % rows - at + change) * dt
         # Before its delayed update an input still has the previous sample's value.
-        if hold[j] < 0.0 and inside < -hold[j]:
-            us[j] = u[max(row - 1, 0), j]
-            us[u.shape[1]] = max(-hold[j] - at, 0.0) * dt
-        elif hold[j] <= 0.0:
-            us[u.shape[1]] = (rows - row % rows - at - hold[j]) * dt
-        elif at > 0.0:
-            us[j] += at * (u[row + 1, j] - u[row, j])
+        if inside < change:
+            behind += 1.0
+            us[u.shape[1]] = max(change - at, 0.0) * dt
+        us[j] = u[max(row - int(behind), oldest), j]
 
 
 @part(error_model="numpy")
 def advance(  # noqa: PLR0917 -- a kernel
-    step: int, u: FloatArray, row: int, start: float, end: float, hold: FloatArray, rows: int,
-    dt: float, pp: int, z: FloatArray, us: FloatArray, times: FloatArray,
+    step: int, u: FloatArray, row: int, oldest: int, start: float, end: float, hold: FloatArray,
+    rows: int, dt: float, pp: int, z: FloatArray, us: FloatArray, times: FloatArray,
 ) -> None:  # fmt: skip
     """One Runge-Kutta step between two fractions of a sample; updates z in place.
 
@@ -98,9 +113,9 @@ def advance(  # noqa: PLR0917 -- a kernel
     """
     middle = 0.5 * (start + end)
     # Inputs at both ends are chosen as inside the step: a jump at an end is not part of it.
-    place(u, row, start, middle, hold, rows, dt, us[0])
-    place(u, row, middle, middle, hold, rows, dt, us[1])
-    place(u, row, end, middle, hold, rows, dt, us[2])
+    place(u, row, oldest, start, middle, hold, rows, dt, us[0])
+    place(u, row, oldest, middle, middle, hold, rows, dt, us[1])
+    place(u, row, oldest, end, middle, hold, rows, dt, us[2])
     for i in range(3):
         us[i, u.shape[1] + 1] = DAMPED / (dt * (end - start))
     times[0] = (row + start) * dt
@@ -112,42 +127,92 @@ def advance(  # noqa: PLR0917 -- a kernel
 
 
 @part(error_model="numpy")
-def lateness(hold: FloatArray) -> float:
-    """Fraction of a sample after which held inputs change."""
-    late = 0.0
+def next_change(hold: FloatArray, start: float) -> float:
+    """Fraction of a sample, after `start`, at which the next held input changes; 1 if none does."""
+    found = 1.0
     for held in hold:
-        late = max(late, -held)
-    return late
+        change = -held - whole_samples(held)
+        if start < change < found:
+            found = change
+    return found
 
 
 @part(error_model="numpy")
 def across(  # noqa: PLR0917 -- a kernel
-    step: int, u: FloatArray, row: int, steps: int, late: float, hold: FloatArray, rows: int,
-    dt: float, pp: int, z: FloatArray, us: FloatArray, times: FloatArray,
+    step: int, plain: int, u: FloatArray, row: int, oldest: int, steps: int, hold: FloatArray,
+    columns: IntArray, rows: int, dt: float, pp: int, z: FloatArray, us: FloatArray,
+    times: FloatArray, before: FloatArray, after: FloatArray,
 ) -> None:  # fmt: skip
-    """Integrate from one sample to the next, in steps that end where an input changes."""
+    """Integrate from one sample to the next, in steps that end where an input changes.
+
+    `columns`: of the first inputs, those of the sensitivities to by how much they are late, -1 if
+    that is fixed. `before` and `after` are room for rates, shape (n,) each.
+    """
     # A step across the jump of a held input would reduce the method to first order.
-    first = math.ceil(steps * late) if late < 1.0 else steps
-    for k in range(first):
-        start, end = late * k / first, late * (k + 1) / first
-        advance(step, u, row, start, end, hold, rows, dt, pp, z, us, times)
-    second = math.ceil(steps * (1.0 - late))
-    for k in range(second):
-        start = late + (1.0 - late) * k / second
-        end = late + (1.0 - late) * (k + 1) / second
-        advance(step, u, row, start, end, hold, rows, dt, pp, z, us, times)
+    start = 0.0
+    change(plain, u, row, oldest, 0.0, 0.0, hold, columns, rows, dt, pp, z, us, before, after)
+    while start < 1.0:
+        end = next_change(hold, start)
+        count = math.ceil(steps * (end - start))
+        for k in range(count):
+            first = start + (end - start) * k / count
+            last = start + (end - start) * (k + 1) / count
+            advance(step, u, row, oldest, first, last, hold, rows, dt, pp, z, us, times)
+        change(
+            plain, u, row, oldest, end, 0.5 * (start + end), hold, columns, rows, dt, pp, z, us,
+            before, after,
+        )  # fmt: skip
+        start = end
+
+
+@part(error_model="numpy")
+def change(  # noqa: PLR0917 -- a kernel
+    plain: int, u: FloatArray, row: int, oldest: int, at: float, inside: float, hold: FloatArray,
+    columns: IntArray, rows: int, dt: float, pp: int, z: FloatArray, us: FloatArray,
+    before: FloatArray, after: FloatArray,
+) -> None:  # fmt: skip
+    """Sensitivities to how late inputs are, where these change at a fraction of a sample."""
+    n, inputs, placed = before.size, u.shape[1], False
+    time, zp, m = (row + at) * dt, z.ctypes.data, z.size // before.size - 1
+    for j in range(columns.size):
+        behind = whole_samples(hold[j])
+        new = row - int(behind)
+        older, newer = u[max(new - 1, oldest), j], u[max(new, oldest), j]
+        if -hold[j] - behind != at or older == newer:
+            continue
+        if not placed:
+            place(u, row, oldest, at, inside, hold, rows, dt, us[0])
+            us[0, inputs + 1] = DAMPED / dt
+            for i in range(inputs + 2):
+                us[1, i] = us[0, i]
+            placed = True
+        # One by one, inputs that change together add up to the change of all.
+        us[0, j], us[1, j] = older, newer
+        if columns[j] >= 0:
+            call(plain, time, zp, us[0].ctypes.data, pp, before.ctypes.data, before.ctypes.data)
+            call(plain, time, zp, us[1].ctypes.data, pp, after.ctypes.data, after.ctypes.data)
+            for i in range(n):
+                z[n + i * m + columns[j]] += before[i] - after[i]
+        us[0, j] = newer
 
 
 @part(error_model="numpy")
 def renew(  # noqa: PLR0917 -- a kernel
-    update: int, u: FloatArray, row: int, hold: FloatArray, rows: int, dt: float, pp: int,
-    z: FloatArray, dz: FloatArray, us: FloatArray,
+    update: int, u: FloatArray, row: int, oldest: int, hold: FloatArray, rows: int, dt: float,
+    pp: int, z: FloatArray, dz: FloatArray, us: FloatArray,
 ) -> None:  # fmt: skip
     """Update the states that change at samples."""
-    place(u, row, 0.0, 0.0, hold, rows, dt, us)
+    place(u, row, oldest, 0.0, 0.0, hold, rows, dt, us)
     call(update, row * dt, z.ctypes.data, us.ctypes.data, pp, dz.ctypes.data, dz.ctypes.data)
     for i in range(z.size):
         z[i] = dz[i]
+
+
+@part(error_model="numpy")
+def delay(hold: FloatArray, delays: IntArray, p: FloatArray, dt: float, held: FloatArray) -> None:
+    """The holds in an interval: those of the first inputs are later by parameters."""
+    for j in range(delays.size):
+        held[j] = hold[j] - max(p[delays[j]], 0.0) / dt
 
 
 @part(error_model="numpy")
@@ -173,9 +238,9 @@ def restart(z: FloatArray, x0: FloatArray, w: int, m: int) -> None:
 
 @part(error_model="numpy")
 def needed(  # noqa: PLR0917 -- a kernel
-    plain: int, pace: int, crossing: IntArray, u: FloatArray, row: int, hold: FloatArray,
-    rows: int, dt: float, pp: int, z: FloatArray, dx: FloatArray, end: FloatArray,
-    near: FloatArray, rates: FloatArray, us: FloatArray,
+    plain: int, pace: int, crossing: IntArray, u: FloatArray, row: int, oldest: int,
+    hold: FloatArray, rows: int, dt: float, pp: int, z: FloatArray, dx: FloatArray,
+    end: FloatArray, near: FloatArray, rates: FloatArray, us: FloatArray,
 ) -> float:  # fmt: skip
     """Number of steps that `pace` requires in the next interval.
 
@@ -188,7 +253,7 @@ def needed(  # noqa: PLR0917 -- a kernel
     ap = asked.ctypes.data
     for i in range(asked.size):
         least[i], most[i] = math.inf, 0.0
-    place(u, row, 0.0, 0.0, hold, rows, dt, us)
+    place(u, row, oldest, 0.0, 0.0, hold, rows, dt, us)
     # The Euler step carries a memory no further than to where it slips.
     us[u.shape[1] + 1] = 1.0 / dt
     call(plain, row * dt, z.ctypes.data, up, pp, dx.ctypes.data, dx.ctypes.data)
@@ -201,7 +266,7 @@ def needed(  # noqa: PLR0917 -- a kernel
         near[i] = math.copysign(max(abs(middle) - reach, 0.0), middle)
     for at, share in ((z, 0.0), (near, 0.0), (end, 1.0)):
         if share > 0.0:
-            place(u, row, share, share, hold, rows, dt, us)
+            place(u, row, oldest, share, share, hold, rows, dt, us)
         call(pace, (row + share) * dt, at.ctypes.data, up, pp, ap, ap)
         for i in range(asked.size):
             least[i], most[i] = min(least[i], abs(asked[i])), max(most[i], abs(asked[i]))
@@ -215,26 +280,31 @@ def needed(  # noqa: PLR0917 -- a kernel
 @kernel(allocates=True, error_model="numpy", nogil=True)
 def simulate(  # noqa: PLR0917 -- a kernel
     step: int, read: int, plain: int, pace: int, update: int, updated: bool, asked: int,
-    crossing: IntArray, m: int, rows: int, u: FloatArray, dt: float, substeps: int, finest: int,
-    hold: FloatArray, starts: IntArray, x0: FloatArray, p: FloatArray, y: FloatArray,
-    dy: FloatArray, last: FloatArray,
+    crossing: IntArray, delays: IntArray, columns: IntArray, m: int, rows: int, u: FloatArray,
+    spacing: FloatArray, begins: IntArray, substeps: int, finest: int, hold: FloatArray,
+    starts: IntArray, x0: FloatArray, p: FloatArray, y: FloatArray, dy: FloatArray,
+    last: FloatArray,
 ) -> None:  # fmt: skip
     """Fill outputs y (windows, samples, outputs), slopes dy (…, m) and the last z of each window.
 
-    Held inputs change every `rows` rows. Each interval uses `substeps` steps, or as many up to
-    `finest` as the `asked` rates of `pace` require.
+    `spacing` is the time from each row of `u` to the next, `begins` the first row of its recording.
+    Held inputs change every `rows` rows; the first are late by the parameters `delays`, see
+    `across` for their `columns`. Each interval uses `substeps` steps, or as many up to `finest` as
+    the `asked` rates of `pace` require.
     """
     n, size = x0.shape[1], x0.shape[1] * (1 + m)
     dx, end, near, rates = np.empty(n), np.empty(n), np.empty(n), np.empty((3, asked))
     z, dz, times = np.empty(size), np.empty(size), np.empty(4)
     between, us = input_rows(u, 3), input_rows(u, 1)[0]
-    wanted, late = y.shape[2], lateness(hold)
+    wanted, held = y.shape[2], hold.copy()
     pp, out, slopes = p.ctypes.data, np.empty(wanted), np.empty(wanted * m)
     for w in range(starts.size):
         restart(z, x0, w, m)
         for k in range(y.shape[1]):
             row = starts[w] + k
-            place(u, row, 0.0, 0.0, hold, rows, dt, us)
+            dt, oldest = spacing[row], begins[row]
+            delay(hold, delays, p, dt, held)
+            place(u, row, oldest, 0.0, 0.0, held, rows, dt, us)
             call(
                 read, row * dt, z.ctypes.data, us.ctypes.data, pp, out.ctypes.data,
                 slopes.ctypes.data,
@@ -247,14 +317,17 @@ def simulate(  # noqa: PLR0917 -- a kernel
                 steps = substeps
                 if asked > 0 and finest > substeps:
                     wanted_steps = needed(
-                        plain, pace, crossing, u, row, hold, rows, dt, pp, z, dx, end, near, rates,
-                        us,
+                        plain, pace, crossing, u, row, oldest, held, rows, dt, pp, z, dx, end,
+                        near, rates, us,
                     )  # fmt: skip
                     steps = int(min(float(finest), max(float(substeps), math.ceil(wanted_steps))))
-                across(step, u, row, steps, late, hold, rows, dt, pp, z, between, times)
+                across(
+                    step, plain, u, row, oldest, steps, held, columns, rows, dt, pp, z, between,
+                    times, dx, end,
+                )  # fmt: skip
                 # Sampled states change together with the held signals.
                 if updated and (row + 1) % rows == 0:
-                    renew(update, u, row + 1, hold, rows, dt, pp, z, dz, us)
+                    renew(update, u, row + 1, oldest, held, rows, dt, pp, z, dz, us)
                 forget(z)
         for i in range(size):
             last[w, i] = z[i]
@@ -262,16 +335,15 @@ def simulate(  # noqa: PLR0917 -- a kernel
 
 @kernel(allocates=True, error_model="numpy", nogil=True)
 def linearise(  # noqa: C901, PLR0912, PLR0917 -- a kernel
-    plain_step: int, read_slopes: int, rate_slopes: int, update_slopes: int, u: FloatArray,
-    dt: float,
-    substeps: int, hold: FloatArray, starts: IntArray, x0: FloatArray, p: FloatArray,
-    nodes: FloatArray, slopes: FloatArray, y: FloatArray, dy: FloatArray, jumps: FloatArray,
+    plain_step: int, read_slopes: int, rate_slopes: int, update_slopes: int, delays: IntArray,
+    u: FloatArray, spacing: FloatArray, begins: IntArray, substeps: int, hold: FloatArray,
+    starts: IntArray, x0: FloatArray, p: FloatArray, nodes: FloatArray, slopes: FloatArray,
+    y: FloatArray, dy: FloatArray, jumps: FloatArray,
 ) -> None:  # fmt: skip
     """The trajectory without sensitivities, and the Jacobians at its nodes."""
     n, wide = x0.shape[1], slopes.shape[3]
     z, times, between = np.empty(n), np.empty(4), input_rows(u, 3)
-    us, wanted, pp = input_rows(u, 1)[0], y.shape[2], p.ctypes.data
-    us[u.shape[1] + 1] = DAMPED_BY_HEUN * substeps / dt
+    us, wanted, pp, held = input_rows(u, 1)[0], y.shape[2], p.ctypes.data, hold.copy()
     out, flat = np.empty(max(wanted, n)), np.empty(max(wanted, n) * wide)
     zp, up, op, fp = z.ctypes.data, us.ctypes.data, out.ctypes.data, flat.ctypes.data
     for w in range(starts.size):
@@ -279,9 +351,12 @@ def linearise(  # noqa: C901, PLR0912, PLR0917 -- a kernel
             z[i] = x0[w, i]
         for k in range(y.shape[1]):
             row, last = starts[w] + k, k + 1 == y.shape[1]
+            dt, oldest = spacing[row], begins[row]
+            us[u.shape[1] + 1] = DAMPED_BY_HEUN * substeps / dt
+            delay(hold, delays, p, dt, held)
             for step in range(1 if last else substeps):
                 share = step / substeps
-                place(u, row, share, share, hold, 1, dt, us)
+                place(u, row, oldest, share, share, held, 1, dt, us)
                 if step == 0:
                     call(read_slopes, row * dt, zp, up, pp, op, fp)
                     for o in range(wanted):
@@ -295,12 +370,15 @@ def linearise(  # noqa: C901, PLR0912, PLR0917 -- a kernel
                     for j in range(wide):
                         slopes[w, node, i, j] = flat[i * wide + j]
                 if not last:
-                    following = (step + 1) / substeps
-                    advance(
-                        plain_step, u, row, share, following, hold, 1, dt, pp, z, between, times
-                    )
+                    while share < (step + 1) / substeps:
+                        following = min(next_change(held, share), (step + 1) / substeps)
+                        advance(
+                            plain_step, u, row, oldest, share, following, held, 1, dt, pp, z,
+                            between, times,
+                        )  # fmt: skip
+                        share = following
             if jumps.shape[1] > 0 and not last:
-                place(u, row + 1, 0.0, 0.0, hold, 1, dt, us)
+                place(u, row + 1, oldest, 0.0, 0.0, held, 1, dt, us)
                 call(update_slopes, (row + 1) * dt, zp, up, pp, op, fp)
                 for i in range(n):
                     z[i] = out[i]

@@ -50,6 +50,7 @@ class Equations:
         pace: rates that determine the step size.
         updates: all states after a sample; none without sampled states.
         memory: indices of the states that are no faster than a step allows.
+        delays: of the first inputs, which arrive late: index of the parameter by which.
     """
 
     states: tuple[str, ...]
@@ -62,6 +63,7 @@ class Equations:
     pace: Pace
     updates: tuple[sympy.Expr, ...] = ()
     memory: tuple[int, ...] = ()
+    delays: tuple[int, ...] = ()
 
 
 class Jacobians(NamedTuple):
@@ -77,10 +79,11 @@ def native_kernel(system: System) -> "NativeKernel":
     """The kernel of `system`, shared by all systems with the same equations."""
     return _kernel(
         Equations(
-            tuple(system.states), tuple(system.model.inputs), tuple(system.parameters),
+            tuple(system.states), (*system.delayed, *system.model.inputs), tuple(system.parameters),
             system.free, system.probes, tuple(system.derivatives.values()),
             tuple(system.outputs.values()), pace(system), _updates(system),
             tuple(map(list(system.states).index, bounded_memory(system))),
+            tuple(list(system.parameters).index(own.parameter) for own in system.delayed.values()),
         )
     )  # fmt: skip
 
@@ -109,6 +112,12 @@ class NativeKernel:
         self._slopes: Jacobians | None = None
         self._sweeps: dict[int, tuple[int, int, int]] = {}
         self._crossing = np.array(system.pace.crossing, np.int64)
+        self._delays = np.array(system.delays, np.int64)
+        names = [system.parameters[index] for index in system.delays]
+        free = system.free
+        self._delay_columns = np.array(
+            [free.index(n) if n in free else -1 for n in names], np.int64
+        )
 
     def _compiled(self, functions: Sequence[Function], step: str = "") -> Any:
         with turn_given():
@@ -137,14 +146,14 @@ class NativeKernel:
         return self._along
 
     def simulate(  # noqa: PLR0917 -- they stand in the order of the driver's
-        self, u: Any, dt: Any, substeps: Any, hold: Any, starts: Any, x0: Any, p: Any, y: Any,
-        dy: Any, last: Any, rows: int, finest: int,
+        self, u: Any, spacing: Any, begins: Any, substeps: Any, hold: Any, starts: Any, x0: Any,
+        p: Any, y: Any, dy: Any, last: Any, rows: int, finest: int,
     ) -> None:  # fmt: skip
         """Fill outputs (windows, samples, outputs), their slopes (…, m) and the last [x | S]."""
         kernel = partial(
             driver.simulate, *self._compiled_along(), bool(self._system.updates),
-            len(self._system.pace.asked), self._crossing, self._columns, rows, u, dt, substeps,
-            finest, hold,
+            len(self._system.pace.asked), self._crossing, self._delays, self._delay_columns,
+            self._columns, rows, u, spacing, begins, substeps, finest, hold,
         )  # fmt: skip
         numbers = x0.shape[1] * (1 + self._columns)
         # Starting threads costs more than a small simulation.
@@ -208,8 +217,8 @@ class NativeKernel:
         return self._slopes
 
     def linearise(  # noqa: PLR0917 -- they stand in the order of the driver's
-        self, u: Any, dt: Any, substeps: Any, hold: Any, starts: Any, x0: Any, p: Any, nodes: Any,
-        slopes: Any, y: Any, dy: Any, jumps: Any,
+        self, u: Any, spacing: Any, begins: Any, substeps: Any, hold: Any, starts: Any, x0: Any,
+        p: Any, nodes: Any, slopes: Any, y: Any, dy: Any, jumps: Any,
     ) -> None:  # fmt: skip
         """Fill the states at the nodes, the slopes of rates there, outputs and their slopes.
 
@@ -218,8 +227,9 @@ class NativeKernel:
         equations = self.jacobians()
         with turn_given():
             driver.linearise(
-                *equations, u, dt, substeps, hold, starts, x0, p, nodes, slopes, y, dy, jumps
-            )
+                *equations, self._delays, u, spacing, begins, substeps, hold, starts, x0, p, nodes,
+                slopes, y, dy, jumps,
+            )  # fmt: skip
 
 
 def _function(system: Equations, name: str) -> Function:

@@ -33,13 +33,17 @@ def even_substeps(
     wanted = pace(system)
     if not wanted.asked:
         return 1
-    names = (TIME, UNTIL, *system.states, *system.model.inputs, *system.parameters, *system.probes)
+    known = (TIME, UNTIL, *system.states, *system.model.inputs, *system.parameters, *system.probes)
+    names = (*known, *system.delayed)
+    # How late they arrive hardly changes how steep the equations are anywhere.
+    late = inputs[:, [list(system.model.inputs).index(own.name) for own in system.delayed.values()]]
     function = numpy_function(names, wanted.asked)
     standing = states.copy()
     standing[:, wanted.crossing] = 0.0
     fastest = 0.0
     for at in (states, standing):
-        asked = function(0.0, 0.0, *at.T, *inputs.T, *parameters, *[0.0] * len(system.probes))
+        probes = [0.0] * len(system.probes)
+        asked = function(0.0, 0.0, *at.T, *inputs.T, *parameters, *probes, *late.T)
         sizes = [float(np.nanmax(np.abs(rate))) for rate in asked]
         steep, bounded = len(wanted.crossing), len(sizes) - wanted.bounded
         steps = [size / COARSER for size in sizes[:steep]]

@@ -105,6 +105,13 @@ class Effect(Section, frozen=True, kw_only=True):
     time_shift: Annotated[
         bool, Meta(description="only delays: between one input and one output its port is unknown")
     ] = False
+    delays: Annotated[
+        str,
+        Meta(
+            description="parameter by which the effect only delays its signal; what is held between"
+            " samples is then delayed exactly, without states"
+        ),
+    ] = ""
     elective: Annotated[
         bool, Meta(description="ranked only in studies that say whole_library = true")
     ] = False

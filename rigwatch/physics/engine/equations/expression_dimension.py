@@ -40,15 +40,31 @@ def dimension_of(text: str, dimensions: Mapping[str, Dimension], where: str) -> 
 
 
 def has_bare_number(text: str) -> bool:
-    """Whether an expression has a number that may lack a unit: one added, or with decimals."""
+    """Whether an expression has a number that may lack a unit.
+
+    That is one that is added, compared or a bound, as in max(p, 1000), or has decimals.
+    """
     nodes = list(ast.walk(syntax_tree(text, "")))
-    sums = [n for n in nodes if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add | ast.Sub)]
-    added = [side for each in sums for side in (each.left, each.right)]
+    alike = [side for node in nodes for side in _of_one_unit(node)]
     numbers = [node for node in nodes if isinstance(node, ast.Constant)]
     return any(
-        isinstance(one.value, int | float) and one.value and (one in added or one.value % 1)
+        isinstance(one.value, int | float) and one.value and (one in alike or one.value % 1)
         for one in numbers
     )
+
+
+def _of_one_unit(node: ast.AST) -> list[ast.expr]:
+    """The parts of a node that must have one unit."""
+    match node:
+        case ast.BinOp(left=left, op=ast.Add() | ast.Sub(), right=right):
+            return [left, right]
+        case ast.Compare(left=left, comparators=others):
+            return [left, *others]
+        case ast.Call(func=ast.Name(id="where"), args=[_, *chosen]):
+            return chosen
+        case ast.Call(func=ast.Name(id=name), args=args) if name in _SAME_UNIT:
+            return args
+    return []
 
 
 class _Measurer:

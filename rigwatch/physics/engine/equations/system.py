@@ -6,9 +6,10 @@ applied in sequence, in the order of placement unless they are placed ahead.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import sympy
+from msgspec import structs
 
 from rigwatch.physics.engine.equations.effect import Effect
 from rigwatch.physics.engine.equations.expression import names_in
@@ -63,12 +64,25 @@ class Placement:
 
 
 @dataclass(frozen=True)
+class Delayed:
+    """An input that is held between samples and arrives late.
+
+    Attributes:
+        name: the input.
+        parameter: by how much [s].
+    """
+
+    name: str
+    parameter: str
+
+
+@dataclass(frozen=True)
 class System:
     """Equations of a model with its effects.
 
     Attributes:
         model: the model with its quantities expanded.
-        placements: the effects, in order.
+        placements: the effects, in order; those that delay held inputs have no states here.
         states: by name, those of the model first.
         parameters: by name, those of the model first.
         derivatives: rates of the states, by name.
@@ -77,6 +91,7 @@ class System:
         probes: one symbol per force or actuator port, added to its expression and always 0; the
             derivatives by them give the influence of any further effect there.
         updates: values after each sample of the sampled states, by name; their rates are 0.
+        delayed: held inputs as they arrive late, by their names in the equations.
     """
 
     model: Model
@@ -88,6 +103,7 @@ class System:
     ports: Mapping[str, sympy.Expr]
     probes: tuple[str, ...]
     updates: Mapping[str, sympy.Expr] = field(default_factory=dict)
+    delayed: Mapping[str, Delayed] = field(default_factory=dict)
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -129,7 +145,12 @@ def compose(model: Model, placements: Sequence[Placement] = ()) -> System:
     """
     for placement in placements:
         _check_port(model, placement)
-    return _Composer(model, tuple(placements)).system()
+    system = _Composer(model, tuple(placements)).system()
+    late = {symbol(name) for name in system.delayed}
+    if any(late & output.free_symbols for output in system.outputs.values()):
+        # Read at once, what changes in steps would be no smooth function of when it changes.
+        return _Composer(model, tuple(placements), exact=False).system()
+    return system
 
 
 def _check_port(model: Model, placement: Placement) -> None:
@@ -158,10 +179,18 @@ class _Composer:
     Inputs and states come first, then actuators, forces, equations and outputs, and finally
     sensors. Each is read in a scope that contains everything it may use. A quantity is added as
     soon as everything that it uses is defined, and the actuator that it drives after it.
+
+    Args:
+        model, placements: as for `compose`.
+        exact: whether held inputs are delayed exactly.
     """
 
-    def __init__(self, model: Model, placements: tuple[Placement, ...]) -> None:
-        self._model, self._placements = model, placements
+    def __init__(
+        self, model: Model, placements: tuple[Placement, ...], *, exact: bool = True
+    ) -> None:
+        self._model, self._placements, self._exact = model, placements, exact
+        self._delayed: dict[str, Delayed] = {}
+        self._without_states: dict[str, Placement] = {}
         self._states, self._parameters = dict(model.states), dict(model.parameters)
         self._rates: dict[str, sympy.Expr] = {}
         self._variables: dict[str, dict[str, sympy.Expr]] = {}
@@ -192,7 +221,7 @@ class _Composer:
         outputs |= {self._model.ports[name].signal: value for name, value in sensors.items()}
         return System(
             self._spelt_out,
-            self._placements,
+            tuple(self._without_states.get(each.prefix, each) for each in self._placements),
             self._states,
             self._parameters,
             self._rates,
@@ -200,6 +229,7 @@ class _Composer:
             ports | sensors,
             tuple(PROBE + name for name in ports),
             self._updates,
+            self._delayed,
         )
 
     def _known(self) -> list[str]:
@@ -273,6 +303,8 @@ class _Composer:
         self, placement: Placement, port: Port, arriving: sympy.Expr, unit: str
     ) -> sympy.Expr:
         """An effect's force at a force port, or its output signal at a signal port."""
+        if self._is_exact(placement, port, arriving):
+            return self._delayed_by(placement, arriving)
         scope = self._local_scope(placement, port, arriving, unit)
         for name, state in placement.effect.states.items():
             label, where = placement.prefix + name, f"{placement}: state {name}"
@@ -283,6 +315,32 @@ class _Composer:
             else:
                 self._rates[label] = scope.read(state.derivative, f"({unit_of})/s", where)
         return scope.read(placement.effect.expression, unit, str(placement))
+
+    def _is_exact(self, placement: Placement, port: Port, arriving: sympy.Expr) -> bool:
+        """Whether an effect only delays what is held between samples.
+
+        That changes in steps, each of which can be integrated up to its own instant. Effects with
+        memory at the same port would have to follow.
+        """
+        if not (self._exact and placement.effect.delays and self._model.states):
+            return False
+        order = signal_order(self._placements, placement.entry)
+        alone = not any(each.effect.states for each in order if each is not placement)
+        known = {symbol(name) for name in (*self._model.inputs, *self._parameters)}
+        return alone and hold_at(self._model, port) == "zero" and arriving.free_symbols <= known
+
+    def _delayed_by(self, placement: Placement, arriving: sympy.Expr) -> sympy.Expr:
+        """What arrives, with its inputs delayed by an effect."""
+        effect = structs.replace(placement.effect, states={}, expression="u")
+        own = self._without_states[placement.prefix] = replace(placement, effect=effect)
+        self._adopt(own)
+        late = {}
+        for name in self._model.inputs:
+            if symbol(name) in arriving.free_symbols:
+                label = f"{placement.prefix}{name}"
+                self._delayed[label] = Delayed(name, placement.prefix + effect.delays)
+                late[symbol(name)] = symbol(label)
+        return arriving.xreplace(late)
 
     def _local_scope(
         self, placement: Placement, port: Port, arriving: sympy.Expr, unit: str

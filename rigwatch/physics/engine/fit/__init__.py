@@ -17,11 +17,13 @@ from rigwatch.physics.engine.fit.port_signals import port_signals
 from rigwatch.physics.engine.fit.problem import ENOUGH, Problem, Started
 from rigwatch.physics.engine.fit.recorded_effect_states import RecordedEffectStates
 from rigwatch.physics.engine.fit.recording import (
+    SAME_SPACING,
     Recording,
     beginning,
     filled,
     initial_states,
     joined,
+    of_parts,
     shown_states,
     windows,
 )
@@ -46,6 +48,7 @@ __all__ = [
     "ENOUGH",
     "FAR",
     "QUIET",
+    "SAME_SPACING",
     "EffectStates",
     "Fit",
     "Prior",
@@ -69,6 +72,7 @@ __all__ = [
     "motion_rates",
     "motion_recording",
     "motion_widths",
+    "of_parts",
     "port_signals",
     "result_of",
     "shown_states",

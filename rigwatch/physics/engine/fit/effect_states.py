@@ -37,7 +37,7 @@ class EffectStates:
     Args:
         effect: with states; its parameters remain parameters of the kernel, compiled once.
         signals: signals the effect may use, by name, each of shape (nodes,); may include time.
-        spacing: between the nodes [s].
+        spacing: time from each node to the next, shape (nodes,) [s].
         hold: hold of the signals between nodes, see `equations.hold_at`.
         rows: number of nodes per change of a held signal.
         late: delay of held signals, as a share of the spacing.
@@ -47,7 +47,7 @@ class EffectStates:
         self,
         effect: Effect,
         signals: Mapping[str, FloatArray],
-        spacing: float,
+        spacing: FloatArray,
         hold: Hold,
         rows: int = 1,
         late: float = 0.0,
@@ -66,8 +66,8 @@ class EffectStates:
         self._first = np.array([[state.start for state in effect.states.values()]])
         self._spacing, self._rows = spacing, rows
         # Systems with the same equations and names share a kernel.
-        made_by = (self._compiled.kernel, spacing, rows, hold, late, self._first.tobytes())
-        self._key = (*made_by, self._driving.shape, digest(self._driving))
+        made_by = (self._compiled.kernel, rows, hold, late, self._first.tobytes())
+        self._key = (*made_by, self._driving.shape, digest(self._driving), digest(spacing))
 
     def run(self, values: Mapping[str, float], arriving: Signals | None = None) -> Signals:
         """Each state by name, shape (nodes,).

@@ -57,11 +57,11 @@ def motion_recording(
     chosen = motion_widths(model, recording, parts) if widths is None else widths
     channels = _channels(model, recording)
     counted = _settled(len(recording), cut, round(settling / recording.dt))
-    motion = []
+    spacings, motion = _spacings(recording, cut), []
     for state in measured_states(model):
         signal, width = channels[state.channel], chosen[state.channel]
         behind = (late or {}).get(state.channel, 0.0)
-        motion.append(_smoothed_parts(signal, recording.dt, width, state.order, cut, late=behind))
+        motion.append(_smoothed_parts(signal, spacings, width, state.order, cut, late=behind))
         counted &= _whole_kernel(signal, width, cut)
     inputs = np.column_stack([recording.inputs, *motion])
     outputs = _measured_outputs(model, recording, chosen, cut)
@@ -69,7 +69,10 @@ def motion_recording(
     lengths = tuple(np.diff([0, *cut, len(recording)]).tolist())
     thinning = _thinning(model, recording, chosen, lengths)
     drives = len(model.inputs)
-    return Recording(recording.dt, inputs, shown, thinning, lengths, drives, recording.passed)
+    return Recording(
+        recording.dt, inputs, shown, thinning, lengths, drives, recording.passed,
+        spacings=recording.spacings and spacings,
+    )  # fmt: skip
 
 
 def motion_widths(model: Model, recording: Recording, parts: Sequence[int] = ()) -> dict[str, int]:
@@ -106,7 +109,7 @@ def motion_rates(model: Model, recording: Recording) -> FloatArray:
             raise ModelError(f"{model.name}: found no valid sample of {state.channel!r}")
         longest = max(np.split(signal, cut), key=len)
         width = best_width(filled(longest), order)
-        rate = _smoothed_parts(signal, recording.dt, width, order, cut)
+        rate = _smoothed_parts(signal, _spacings(recording, cut), width, order, cut)
         whole = _whole_kernel(signal, width, cut)
         found.append(np.where(whole, rate, np.nan)[:, None])
     return np.concatenate(found, axis=1)
@@ -163,11 +166,10 @@ def _measured_outputs(
     if kept:
         return recording.outputs[:, [list(model.outputs).index(name) for name in kept]]
     channels = _channels(model, recording)
+    spacings = _spacings(recording, cut)
     rates = [
-        _smoothed_parts(
-            channels[state.channel], recording.dt, widths[state.channel], state.order + 1, cut
-        )
-        for state in balanced_states(model)
+        _smoothed_parts(channels[own.channel], spacings, widths[own.channel], own.order + 1, cut)
+        for own in balanced_states(model)
     ]
     return np.stack(rates, axis=1)
 
@@ -187,6 +189,11 @@ def _ends(recording: Recording, parts: Sequence[int]) -> list[int]:
     return [int(end) for end in np.cumsum(parts or recording.parts)[:-1]]
 
 
+def _spacings(recording: Recording, cut: Sequence[int]) -> tuple[float, ...]:
+    """Time between samples of each part [s]."""
+    return tuple(recording.spacing[[0, *cut]].tolist())
+
+
 def _channels(model: Model, recording: Recording) -> dict[str, FloatArray]:
     """Measured channels by name, each of shape (n,)."""
     names = (output.channel or name for name, output in model.outputs.items())
@@ -194,9 +201,18 @@ def _channels(model: Model, recording: Recording) -> dict[str, FloatArray]:
 
 
 def _smoothed_parts(
-    signal: FloatArray, dt: float, width: int, order: int, cut: Sequence[int], *, late: float = 0.0
+    signal: FloatArray,
+    spacings: Sequence[float],
+    width: int,
+    order: int,
+    cut: Sequence[int],
+    *,
+    late: float = 0.0,
 ) -> FloatArray:
-    pieces = [smoothed(filled(piece), dt, width, order, late) for piece in np.split(signal, cut)]
+    pieces = [
+        smoothed(filled(piece), dt, width, order, late)
+        for piece, dt in zip(np.split(signal, cut), spacings, strict=True)
+    ]
     return np.concatenate(pieces)
 
 

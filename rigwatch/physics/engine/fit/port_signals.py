@@ -22,7 +22,7 @@ def port_signals(  # noqa: PLR0917 -- they belong together
     placement: Placement,
     inputs: FloatArray,
     states: FloatArray,
-    dt: float,
+    spacing: FloatArray,
     values: Mapping[str, float],
 ) -> Signals:
     """The signals at an effect's port, computed from the channels.
@@ -32,11 +32,11 @@ def port_signals(  # noqa: PLR0917 -- they belong together
         placement: the effect.
         inputs: shape (n, inputs).
         states: from the channels, shape (n, states).
-        dt: time between samples [s].
+        spacing: time from each sample to the next, shape (n,) [s].
         values: parameters by name.
     """
     port = system.model.ports[placement.entry]
-    known: Signals = {TIME: dt * np.arange(len(inputs), dtype=np.float64)}
+    known: Signals = {TIME: spacing * np.arange(len(inputs), dtype=np.float64)}
     known |= dict(zip(system.states, states.T, strict=True))
     known |= dict(zip(system.model.inputs, inputs.T, strict=True))
 
@@ -52,5 +52,5 @@ def port_signals(  # noqa: PLR0917 -- they belong together
     found = {name: along(variable.expression) for name, variable in port.variables.items()}
     if port.kind != "force":
         found["u"] = along(arriving(system.model, port))
-        found[RATE] = np.asarray(np.gradient(found["u"], dt), np.float64)
+        found[RATE] = np.asarray(np.gradient(found["u"]) / spacing, np.float64)
     return {TIME: known[TIME], **found}

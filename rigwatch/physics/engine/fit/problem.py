@@ -98,19 +98,27 @@ class Problem:
         self._cut = cut_for(system, recording, horizon, apart=apart)
         rows = self._cut.starts[:, None] + np.arange(self._cut.length)
         self.measured = recording.outputs[np.minimum(rows, len(recording) - 1)]
-        self._inputs = recording.inputs
+        self._inputs, self._spacing = recording.inputs, recording.spacing
+        self._begins = recording.begins
         if self._cut.parts:
             ends = np.array(self._cut.parts)[:, None]
             self.measured[np.arange(self._cut.length) >= ends] = np.nan
             beyond = int(rows.max()) + 1 - len(recording)
-            self._inputs = np.pad(recording.inputs, ((0, beyond), (0, 0)), mode="edge")
+            self._inputs = np.pad(self._inputs, ((0, beyond), (0, 0)), mode="edge")
+            self._spacing = np.pad(self._spacing, (0, beyond), mode="edge")
+            self._begins = np.pad(self._begins, (0, beyond), mode="edge")
         self.scale = np.nanstd(recording.outputs, axis=0) if scale is None else scale
         self.scale = np.where(self.scale > 0, self.scale, 1.0)
         begun = initial_states(system, recording)
         self.initial = begun[self._cut.starts]
         self._given_initial = initial
         self._effect_states = RecordedEffectStates(
-            system, recording.inputs, begun, recording.dt, compiled.parameters, recording.slices
+            system,
+            recording.inputs,
+            begun,
+            recording.spacing,
+            compiled.parameters,
+            recording.slices,
         )
         known, counted = self._effect_states.exact, self._effect_states.counted
         self._every = np.setdiff1d(np.arange(len(system.states)), counted)
@@ -217,9 +225,9 @@ class Problem:
         They forget their values in the model's file, which may be far from those of this machine.
         """
         run = self.compiled.simulate(
-            self._inputs, self.recording.dt, self._cut.starts,
+            self._inputs, self._spacing, self._cut.starts,
             max(self._cut.length // FOLLOWED, 2), initial=self.initial, parameters=parameters,
-            substeps=self._substeps,
+            substeps=self._substeps, begins=self._begins,
         )  # fmt: skip
         found = self.initial.copy()
         found[:, self.hidden] = np.clip(run.last, self._low, self._high)[:, self.hidden]
@@ -254,17 +262,20 @@ class Problem:
             Scaled residuals and slopes; states (rows, states), slopes (rows, states, free +
             states).
         """
+        inputs, spacing, begins = self._and_next
         run = self.compiled.simulate(
-            self._inputs_and_next, self.recording.dt, self._cut.starts[rows], self._cut.length + 1,
-            initial=initial, parameters=parameters, substeps=self._substeps,
+            inputs, spacing, self._cut.starts[rows], self._cut.length + 1, initial=initial,
+            parameters=parameters, substeps=self._substeps, begins=begins,
         )  # fmt: skip
         error, slopes = self._scaled(run.outputs[:, :-1], run.slopes[:, :-1], rows)
         return error, slopes, run.last, run.last_slopes
 
     @cached_property
-    def _inputs_and_next(self) -> FloatArray:
-        """The inputs with the last sample repeated, so that the last window has a next one."""
-        return np.pad(self._inputs, ((0, 1), (0, 0)), mode="edge")
+    def _and_next(self) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Inputs, spacing and begins, the last sample repeated: the last window has a next one."""
+        inputs = np.pad(self._inputs, ((0, 1), (0, 0)), mode="edge")
+        spacing = np.pad(self._spacing, (0, 1), mode="edge")
+        return inputs, spacing, np.pad(self._begins, (0, 1), mode="edge")
 
     def _scaled(
         self, outputs: FloatArray, slopes: FloatArray, rows: IntArray
@@ -285,8 +296,8 @@ class Problem:
         if key in self._runs:
             return self._runs[key]
         run = self.compiled.simulate(
-            self._inputs, self.recording.dt, self._cut.starts[rows], self._cut.length,
-            initial=initial, parameters=parameters, substeps=self._substeps,
+            self._inputs, self._spacing, self._cut.starts[rows], self._cut.length,
+            initial=initial, parameters=parameters, substeps=self._substeps, begins=self._begins,
         )  # fmt: skip
         while len(self._runs) >= REMEMBERED:
             del self._runs[next(iter(self._runs))]
@@ -350,10 +361,11 @@ class Problem:
 
     def ends_before(self, parameters: FloatArray, rows: IntArray) -> FloatArray:
         """Final states of the windows preceding `rows`, shape (rows, states)."""
-        r, before = self.recording, rows - 1
+        before = rows - 1
         run = self.compiled.simulate(
-            r.inputs, r.dt, self._cut.starts[before], self._cut.length + 1,
+            self._inputs, self._spacing, self._cut.starts[before], self._cut.length + 1,
             initial=self.initial[before], parameters=parameters, substeps=self._substeps,
+            begins=self._begins,
         )  # fmt: skip
         ended = np.clip(run.last, self._low, self._high)
         return np.where(np.isfinite(ended), ended, self.initial[rows])

@@ -58,23 +58,23 @@ class _PlacedStates:
         return [c for c, state in zip(self.columns, states, strict=True) if state.known]
 
     def run(
-        self, own: Mapping[str, float], values: Mapping[str, float], dt: float
+        self, own: Mapping[str, float], values: Mapping[str, float], spacing: FloatArray
     ) -> list[FloatArray]:
         """Each state along all samples, shape (n,).
 
         Args:
             own: the effect's parameters by its own names.
             values: all parameters by name.
-            dt: time between samples [s].
+            spacing: time from each sample to the next, shape (n,) [s].
         """
-        arriving = self.arriving(values, dt)
+        arriving = self.arriving(values, spacing)
         runs = [
             states.run(own, {name: signal[part] for name, signal in arriving.items()})
             for states, part in zip(self.states, self.parts, strict=True)
         ]
         return [np.concatenate([run[name] for run in runs]) for name in runs[0]]
 
-    def arriving(self, values: Mapping[str, float], dt: float) -> Signals:
+    def arriving(self, values: Mapping[str, float], spacing: FloatArray) -> Signals:
         """The arriving signal and its rate; empty if the effect is the first at its port."""
         if not self.before:
             return {}
@@ -84,7 +84,7 @@ class _PlacedStates:
                 own = _own(placement, values)
                 known = self.signals | {"u": passed}
                 passed = evaluated(placement.effect.expression, known, own, str(placement))
-        return {"u": passed, RATE: np.asarray(np.gradient(passed, dt), np.float64)}
+        return {"u": passed, RATE: np.asarray(np.gradient(passed) / spacing, np.float64)}
 
 
 def _own(placement: Placement, values: Mapping[str, float]) -> dict[str, float]:
@@ -107,7 +107,7 @@ class RecordedEffectStates:
         system: a model with effects.
         inputs: shape (n, inputs).
         states: from the channels, shape (n, states).
-        dt: time between samples [s].
+        spacing: time from each sample to the next, shape (n,) [s].
         parameters: all parameters, shape (n_p,), on which a port's signals may depend.
         parts: samples of each of the joined recordings; all of one if None.
 
@@ -122,21 +122,21 @@ class RecordedEffectStates:
         system: System,
         inputs: FloatArray,
         states: FloatArray,
-        dt: float,
+        spacing: FloatArray,
         parameters: FloatArray,
         parts: Sequence[slice] | None = None,
     ) -> None:
         self._names = list(system.parameters)
         values = dict(zip(self._names, parameters.tolist(), strict=True))
-        order, self._dt = list(system.states), dt
+        order, self._spacing = list(system.states), spacing
         self._placed = []
         for placement in (each for each in system.placements if each.effect.states):
-            signals = port_signals(system, placement, inputs, states, dt, values)
+            signals = port_signals(system, placement, inputs, states, spacing, values)
             port = system.model.ports[placement.entry]
             apart = _divided(placement, parts)
             own = [
                 EffectStates(
-                    placement.effect, {n: s[part] for n, s in signals.items()}, dt,
+                    placement.effect, {n: s[part] for n, s in signals.items()}, spacing[part],
                     hold_at(system.model, port), late=delay_at(system.model, port),
                 )
                 for part in apart
@@ -161,7 +161,7 @@ class RecordedEffectStates:
         found: dict[int, FloatArray] = {}
         for placed in self._placed:
             own = _own(placed.placement, values)
-            found |= dict(zip(placed.columns, placed.run(own, values, self._dt), strict=True))
+            found |= dict(zip(placed.columns, placed.run(own, values, self._spacing), strict=True))
         return found
 
 

@@ -11,13 +11,16 @@ from rigwatch.physics.engine.fit.decimation import Thinning
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
 
+SAME_SPACING = 1e-6
+"""Relative difference of times between samples up to which they are the same."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Measured inputs and outputs for one model.
 
     Attributes:
-        dt: time between samples [s].
+        dt: time between samples, the mean if it differs from recording to recording [s].
         inputs: in the order of the model's inputs, shape (n, n_u).
         outputs: in the order of its outputs, shape (n, n_y); NaN without a valid sample.
         thinning: filter and decimation of residuals and sensitivities, None without.
@@ -27,6 +30,7 @@ class Recording:
         passed: frequency up to which the outputs keep their noise, over the rate.
         breaks: samples before which inputs are unknown for a while, so that hidden states begin
             anew in the next window.
+        spacings: time between the samples of each part if they differ [s]; all `dt` if empty.
     """
 
     dt: float
@@ -37,6 +41,7 @@ class Recording:
     driving: int | None = None
     passed: float = 0.5
     breaks: tuple[int, ...] = ()
+    spacings: tuple[float, ...] = ()
 
     def __len__(self) -> int:
         return len(self.inputs)
@@ -53,6 +58,22 @@ class Recording:
         """Samples of each of the concatenated recordings."""
         ends = np.cumsum(self.parts or (len(self),)).tolist()
         return [slice(start, end) for start, end in zip([0, *ends], ends, strict=False)]
+
+    @property
+    def own_spacings(self) -> tuple[float, ...]:
+        """Time between samples of each of the concatenated recordings [s]."""
+        return self.spacings or (self.dt,) * max(len(self.parts), 1)
+
+    @property
+    def spacing(self) -> FloatArray:
+        """Time from each sample to the next, shape (n,) [s]."""
+        return np.repeat(self.own_spacings, self.parts or (len(self),))
+
+    @property
+    def begins(self) -> IntArray:
+        """First sample of the recording that each belongs to, shape (n,)."""
+        first = np.array([part.start for part in self.slices], np.int64)
+        return np.repeat(first, self.parts or (len(self),))
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,11 +125,32 @@ def joined(recordings: Sequence[Recording]) -> Recording:
         for signals in ("inputs", "outputs")
     )
     lengths = tuple(map(len, recordings))
+    dt, spacings = of_parts([each.dt for each in recordings], lengths)
     begins = np.cumsum([0, *lengths[:-1]]).tolist()
     breaks = tuple(
         begin + at for begin, each in zip(begins, recordings, strict=True) for at in each.breaks
     )
-    return replace(first, inputs=inputs, outputs=outputs, parts=lengths, breaks=breaks)
+    return replace(
+        first,
+        dt=dt,
+        inputs=inputs,
+        outputs=outputs,
+        parts=lengths,
+        breaks=breaks,
+        spacings=spacings,
+    )
+
+
+def of_parts(spacings: Sequence[float], lengths: Sequence[int]) -> tuple[float, tuple[float, ...]]:
+    """`dt` and `spacings` of a recording of parts.
+
+    Args:
+        spacings: time between samples of each part [s].
+        lengths: samples of each.
+    """
+    if max(spacings) <= min(spacings) * (1 + SAME_SPACING):
+        return spacings[0], ()
+    return float(np.average(spacings, weights=lengths)), tuple(spacings)
 
 
 def beginning(recording: Recording, samples: int) -> Recording:
@@ -117,8 +159,9 @@ def beginning(recording: Recording, samples: int) -> Recording:
     thinning = recording.thinning and recording.thinning.of_part(len(inputs))
     breaks = tuple(at for at in recording.breaks if at < len(inputs))
     return replace(
-        recording, inputs=inputs, outputs=outputs, thinning=thinning, parts=(), breaks=breaks
-    )
+        recording, dt=recording.own_spacings[0], inputs=inputs, outputs=outputs, thinning=thinning,
+        parts=(), breaks=breaks, spacings=(),
+    )  # fmt: skip
 
 
 def cut_for(system: System, recording: Recording, horizon: int, *, apart: bool = False) -> Windows:
@@ -151,8 +194,8 @@ def initial_states(system: System, recording: Recording, smoothed: int = 11) -> 
         if state.measured in channels:
             found[:, index] = filled(channels[state.measured])
         elif state.rate_of in channels:
-            for part in recording.slices:
-                found[part, index] = _rate(channels[state.rate_of][part], smoothed, recording.dt)
+            for part, dt in zip(recording.slices, recording.own_spacings, strict=True):
+                found[part, index] = _rate(channels[state.rate_of][part], smoothed, dt)
     return found
 
 

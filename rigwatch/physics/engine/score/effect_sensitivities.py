@@ -139,7 +139,7 @@ def _propagated(
 @kernel(allocates=True, nogil=True)
 def _propagate(  # noqa: C901, PLR0917 -- a kernel
     rates: FloatArray, reads: FloatArray, updates: FloatArray, free: int, columns: IntArray,
-    held: BoolArray, pushes: FloatArray, h: float, substeps: int, moved: FloatArray,
+    held: BoolArray, pushes: FloatArray, spacing: FloatArray, substeps: int, moved: FloatArray,
 ) -> None:  # fmt: skip
     """Heun's method over the nodes, candidate by candidate; the outputs are read at the samples.
 
@@ -168,6 +168,7 @@ def _propagate(  # noqa: C901, PLR0917 -- a kernel
                             value += reads[w, k, o, free + j] * response[j]
                         moved[c, w, k, o] = value
                 if node + 1 < nodes:
+                    h = spacing[w, node]
                     _slopes(rates[w, node], free, column, push, response, slope)
                     for i in range(n):
                         ahead[i] = response[i] + h * slope[i]

@@ -31,7 +31,7 @@ class Trajectory:
     Attributes:
         compiled: the model.
         run: its linearisation.
-        inputs: at the nodes, shape (windows, nodes, inputs).
+        inputs: at the nodes, those that arrive late last, shape (windows, nodes, inputs).
         time: at the nodes, shape (windows, nodes) [s].
         parameters: all of them, shape (n_p,).
     """
@@ -46,29 +46,43 @@ class Trajectory:
 def trajectory(
     compiled: CompiledSystem,
     inputs: FloatArray,
-    dt: float,
+    dt: float | FloatArray,
     starts: IntArray,
     length: int,
     *,
     initial: FloatArray,
     parameters: FloatArray,
     substeps: int = 4,
+    begins: IntArray | None = None,
 ) -> Trajectory:
-    """The run of `CompiledSystem.linearise` with inputs and time at its nodes."""
+    """The run of `CompiledSystem.linearise`, same arguments, with inputs and time at its nodes."""
     run = compiled.linearise(
-        inputs, dt, starts, length, initial=initial, parameters=parameters, substeps=substeps
-    )
+        inputs, dt, starts, length, initial=initial, parameters=parameters, substeps=substeps,
+        begins=begins,
+    )  # fmt: skip
     nodes = np.arange(run.states.shape[1])
     row, place = nodes // substeps, (nodes % substeps) / substeps
     rows = starts[:, None] + row
-    following = np.minimum(rows + 1, len(inputs) - 1)
+    spacing = np.broadcast_to(dt, len(inputs))[rows]
+    oldest = np.zeros_like(rows) if begins is None else begins[rows]
     model = compiled.system.model
-    share = np.outer(place, [model.held(name) == "linear" for name in model.inputs])
-    late = np.array([own.late for own in model.inputs.values()])
-    before = (place[:, None] < late) & (share == 0.0) & (late > 0)
-    kept = np.where(before, inputs[np.maximum(rows - 1, 0)], inputs[rows])
-    at_nodes = kept + share * (inputs[following] - inputs[rows])
-    return Trajectory(compiled, run, at_nodes, (rows + place) * dt, parameters)
+    parameter = dict(zip(compiled.system.parameters, parameters.tolist(), strict=True))
+    late: dict[str, tuple[str, FloatArray | float]] = {
+        name: (name, own.late) for name, own in model.inputs.items()
+    }
+    for label, own in compiled.system.delayed.items():
+        after = model.inputs[own.name].late + parameter[own.parameter] / spacing
+        late[label] = (own.name, after)
+    at_nodes = np.empty((*rows.shape, len(late)))
+    for column, (name, after) in enumerate(late.values()):
+        signal = inputs[:, list(model.inputs).index(name)]
+        if model.held(name) == "linear":
+            following = np.minimum(rows + 1, len(inputs) - 1)
+            at_nodes[..., column] = signal[rows] + place * (signal[following] - signal[rows])
+        else:
+            behind = np.ceil(after - place).astype(np.int64)
+            at_nodes[..., column] = signal[np.maximum(rows - behind, oldest)]
+    return Trajectory(compiled, run, at_nodes, (rows + place) * spacing, parameters)
 
 
 def port_signals(at: Trajectory, port_name: str) -> dict[str, FloatArray]:
@@ -81,7 +95,7 @@ def port_signals(at: Trajectory, port_name: str) -> dict[str, FloatArray]:
         signals[name] = _along(at, expression)
     if port.kind != "force":
         signals["u"] = _along(at, system.ports[port_name])
-        signals[RATE] = np.gradient(signals["u"], at.run.spacing, axis=1)
+        signals[RATE] = np.gradient(signals["u"], axis=1) / at.run.spacing
         signals[STEP] = _step(signals["u"], at.run.substeps)
         held = port.kind == "sensor" or hold_at(system.model, port) == "zero"
         signals[LEFT] = held * _left(at)
@@ -98,7 +112,8 @@ def _step(signal: FloatArray, substeps: int) -> FloatArray:
 
 
 def _symbols(system: System) -> dict[str, sympy.Expr]:
-    names = (*system.states, *system.parameters, *system.model.inputs, TIME)
+    inputs = (*system.model.inputs, *system.delayed)
+    names = (*system.states, *system.parameters, *inputs, TIME)
     return {name: symbol(name) for name in names} | dict(system.ports)
 
 
@@ -108,7 +123,8 @@ def _along(at: Trajectory, expression: sympy.Expr) -> FloatArray:
     values: dict[str, Any] = dict(zip(system.parameters, at.parameters.tolist(), strict=True))
     values |= dict.fromkeys(system.probes, 0.0) | {TIME: at.time, UNTIL: _left(at)}
     values |= dict(zip(system.states, np.moveaxis(at.run.states, -1, 0), strict=True))
-    values |= dict(zip(system.model.inputs, np.moveaxis(at.inputs, -1, 0), strict=True))
+    inputs = (*system.model.inputs, *system.delayed)
+    values |= dict(zip(inputs, np.moveaxis(at.inputs, -1, 0), strict=True))
     found = numpy_function(list(values), expression)(*values.values())
     return np.broadcast_to(np.asarray(found, np.float64), at.time.shape)
 
@@ -131,9 +147,10 @@ def memory(
     """
     more = ((0, 0), (0, at.run.substeps - 1))
     along = {name: np.pad(signal, more, mode="edge").ravel() for name, signal in signals.items()}
+    spacing = np.pad(at.run.spacing, more, mode="edge").ravel()
     model = at.compiled.system.model
     hold = hold_at(model, model.ports[candidate.port])
-    states = EffectStates(candidate.effect, along, at.run.spacing, hold, at.run.substeps)
+    states = EffectStates(candidate.effect, along, spacing, hold, at.run.substeps)
     windows, nodes = at.time.shape
 
     def found(values: Mapping[str, float]) -> dict[str, FloatArray]:

@@ -143,12 +143,10 @@ def _has(expression: sympy.Expr, names: Sequence[str]) -> bool:
 def _smooth(signal: FloatArray, recording: Recording, width: int, order: int) -> FloatArray:
     """A derivative of a signal; NaN next to gaps."""
     made = np.full(len(signal), np.nan)
-    for part in recording.slices:
+    for part, dt in zip(recording.slices, recording.own_spacings, strict=True):
         if part.stop - part.start > 2 * width:
             whole = filled(signal[part])
-            made[part] = scipy.signal.savgol_filter(
-                whole, width, 3, deriv=order, delta=recording.dt
-            )
+            made[part] = scipy.signal.savgol_filter(whole, width, 3, deriv=order, delta=dt)
     gaps = np.convolve(~np.isfinite(signal), np.ones(width), "same") > 0.5
     return np.where(gaps, np.nan, made)
 
@@ -172,13 +170,19 @@ def _signals(
 ) -> dict[str, FloatArray]:
     """All variables of the equations except the free parameters, along the recording."""
     states = initial_states(system, recording, width)
-    inputs, dt = recording.inputs, recording.dt
-    for column, led in RecordedEffectStates(system, inputs, states, dt, begin).at(begin).items():
-        states[:, column] = led
-    known: dict[str, FloatArray] = {TIME: dt * np.arange(len(inputs), dtype=np.float64)}
+    inputs, spacing = recording.inputs, recording.spacing
+    led = RecordedEffectStates(system, inputs, states, spacing, begin).at(begin)
+    for column, values in led.items():
+        states[:, column] = values
+    known: dict[str, FloatArray] = {TIME: spacing * np.arange(len(inputs), dtype=np.float64)}
     known |= dict(zip(system.states, states.T, strict=True))
     known |= dict(zip(system.model.inputs, inputs.T, strict=True))
     fixed = dict(zip(system.parameters, begin.tolist(), strict=True))
+    samples = np.arange(len(inputs), dtype=np.float64)
+    for name, own in system.delayed.items():
+        # A held value acts until the next sample: it is centred between them.
+        since = samples + 0.5 + fixed[own.parameter] / recording.dt
+        known[name] = np.interp(samples, since, known[own.name])
     return known | {
         name: np.full(len(inputs), value)
         for name, value in fixed.items()
@@ -233,7 +237,15 @@ def _linear(
         weights = 1 / np.maximum(np.array(left), 1e-9)
     vector = begin.copy()
     vector[free] = np.clip(found, low, high)
-    return vector
+    return _with_delays(system, vector, begin)
+
+
+def _with_delays(system: System, found: FloatArray, begin: FloatArray) -> FloatArray:
+    """Parameters with the delays of held inputs, which no balance determines, as they were."""
+    names = list(system.parameters)
+    kept = [names.index(own.parameter) for own in system.delayed.values()]
+    found[kept] = begin[kept]
+    return found
 
 
 def _nonlinear(

@@ -30,7 +30,14 @@ from rigwatch.workbench.explain.sets.enlarging import (
     most_promising,
     scored_with,
 )
-from rigwatch.workbench.ranking import AGAIN, MUCH_WORSE, Progress, Ranked, select_for_fit
+from rigwatch.workbench.ranking import (
+    AGAIN,
+    MUCH_WORSE,
+    Progress,
+    Ranked,
+    same_family,
+    select_for_fit,
+)
 
 BRANCHES = 3
 """Number of effects fitted with each of these sets."""
@@ -116,11 +123,9 @@ def _exchanged(
 
 def _substitutes(row: Ranked, every: Sequence[Ranked]) -> list[Ranked]:
     """The best that look alike or belong to the family, at the same port and at others."""
-    family = row.placement.effect.family
 
     def resembles(each: Ranked) -> bool:
-        kin = bool(family) and each.placement.effect.family == family
-        return each.label != row.label and (kin or each.label in row.alike)
+        return each.label != row.label and (same_family(row, each) or each.label in row.alike)
 
     alike = [each for each in every if resembles(each)]
     here = [each for each in alike if each.port == row.port]

@@ -33,6 +33,7 @@ from rigwatch.workbench.ranking import (
     promises_more,
     refinements,
     refit,
+    same_family,
 )
 
 LIKELY = 0.7
@@ -185,8 +186,7 @@ def _refined(
 
 def _best_of_family(one: Ranked, rows: Sequence[Ranked]) -> Ranked:
     """The effect of a row's family at its port that alone leaves the smallest held-out error."""
-    family = one.placement.effect.family
-    kin = [r for r in rows if family and r.placement.effect.family == family and r.port == one.port]
+    kin = [row for row in rows if same_family(one, row) and row.port == one.port]
     return min(kin, key=lambda row: row.held_out_error, default=one)
 
 

@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from rigwatch.physics.engine.fit import Fit, Recording, windows
+from rigwatch.physics.engine.fit import Fit, Recording, of_parts, windows
 from rigwatch.wire.arrays import IntArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
@@ -121,9 +121,12 @@ def _part(bench: Bench) -> TrainingPart | None:
     stretches = list(_stretches(_counts(whole, cut.length, len(cut.starts)), factor))
     chosen = np.concatenate([np.arange(first, first + count) for first, count in stretches])
     rows = (cut.starts[chosen][:, None] + np.arange(cut.length)).ravel()
+    parts = tuple(count * cut.length for _, count in stretches)
+    own = whole.spacing[cut.starts[[first for first, _ in stretches]]]
+    dt, spacings = of_parts(own.tolist(), parts)
     train = replace(
-        whole, inputs=whole.inputs[rows], outputs=whole.outputs[rows],
-        parts=tuple(count * cut.length for _, count in stretches), breaks=(),
+        whole, dt=dt, inputs=whole.inputs[rows], outputs=whole.outputs[rows], parts=parts,
+        breaks=(), spacings=spacings,
     )  # fmt: skip
     return TrainingPart(replace(data, train=train), chosen)
 
