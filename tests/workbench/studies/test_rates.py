@@ -13,6 +13,7 @@ from rigwatch.workbench.data.columns import Columns
 from rigwatch.workbench.data.noise.quietest_band import quietest_band
 from rigwatch.workbench.data.one_rate import RESAMPLED, resampled
 from rigwatch.workbench.data.signals import prepare
+from rigwatch.workbench.explain.explain import explain
 from tests.workbench.machine import studied
 
 LINE = """
@@ -47,11 +48,13 @@ ports.drive = { kind = "actuator", signal = "force" }
 NOISE = 2e-4
 
 
-def pushed(rate: float, seed: int, mass: float = 0.8, damper: float = 1.5) -> dict[str, np.ndarray]:
-    """Position in closed form after steps of the force."""
+def pushed(
+    rate: float, seed: int, mass: float = 0.8, damper: float = 1.5, late: float = 0.0
+) -> dict[str, np.ndarray]:
+    """Position in closed form after steps of the force, which acts late [s]."""
     rng, count = np.random.default_rng(seed), round(10 * rate)
     force = np.repeat(rng.normal(size=count), 7)[:count]
-    since = np.maximum(np.arange(count)[:, None] - np.arange(count), 0) / rate
+    since = np.maximum((np.arange(count)[:, None] - np.arange(count)) / rate - late, 0.0)
     settling = (1 - np.exp(-damper / mass * since)) * mass / damper
     position = (since - settling) / damper @ np.diff(force, prepend=0.0)
     return {"force": force, "position": position + NOISE * rng.normal(size=count)}
@@ -79,6 +82,22 @@ def test_what_is_held_changes_at_the_samples_of_each_recording(tmp_path: Path) -
     assert found.train_error < 1.03 * NOISE
     assert found.held_out_error < 1.06 * NOISE
     assert found.parameters["m"].value == pytest.approx(0.8, rel=2e-3)
+
+
+def test_a_late_drive_is_found_though_its_sensor_may_be_late_instead(tmp_path: Path) -> None:
+    rates, late = (100.0, 101.3, 100.7), 0.0237
+    one, other, last = (pushed(rate, seed, late=late) for seed, rate in enumerate(rates))
+    model = MASS + 'ports.sensor = { kind = "sensor", signal = "position" }'
+    units = {"force": "N", "position": "m"}
+    found = explain(studied(tmp_path, model, [one, other], [last], units, "horizon = 1.0", rates))
+    assert found.verdict == "missing_effect"
+    first = found.ranking[0]
+    named = {f"{first.effect}@{first.port}", *first.class_}
+    assert {"delay@drive", "delay@sensor"} <= named
+    assert first.parameters["tau"].value == pytest.approx(late, rel=0.01)
+    (drive,) = (row for row in found.ranking if (row.effect, row.port) == ("delay", "drive"))
+    assert drive.held_out_error is not None
+    assert drive.held_out_error < 1.06 * NOISE, "held inputs are delayed exactly"
 
 
 def test_where_the_study_counts_periods_recordings_are_put_on_the_slowest_rate(
