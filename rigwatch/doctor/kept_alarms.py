@@ -19,36 +19,31 @@ _STANDING = "{}.stale"
 
 def kept_alarms(journal: str) -> Iterator[Kept]:
     """The files of this kind beside an alarm journal, those that exist."""
-    yield from _said("alarms sent", Path(MONITOR.format(journal)))
-    yield from _standing(Path(_STANDING.format(journal)))
-    yield from _said("witness's alarms sent", Path(WITNESS.format(journal)))
+    unheard = "set it aside; alarms of earlier runs that nobody has heard count as lost"
+    anew = "set it aside; the witness raises its alarm anew if it has a reason"
+    for what, name, read, change in (
+        ("alarms sent", MONITOR, _said, unheard),
+        ("witness's alarm", _STANDING, _standing, anew),
+        ("witness's alarms sent", WITNESS, _said, unheard),
+    ):
+        path = Path(name.format(journal))
+        try:
+            text = read(path)
+        except FileNotFoundError:
+            continue
+        except OSError as error:
+            yield Kept(what, path, reason_of(error), "fail")
+        except MessageError:
+            yield Kept(what, path, "it is damaged", "warn", change, path.unlink)
+        else:
+            yield Kept(what, path, text)
 
 
-def _said(what: str, path: Path) -> Iterator[Kept]:
-    try:
-        runs = kept_runs(path)
-    except FileNotFoundError:
-        return
-    except OSError as error:
-        yield Kept(what, path, reason_of(error), "fail")
-    except MessageError:
-        change = "set it aside; alarms of earlier runs that nobody has heard count as lost"
-        yield Kept(what, path, "it is damaged", "warn", change, path.unlink)
-    else:
-        alarms = sum(len(run.messages) for run in runs)
-        yield Kept(what, path, f"{alarms} alarms of {len(runs)} runs")
+def _said(path: Path) -> str:
+    runs = kept_runs(path)
+    return f"{sum(len(run.messages) for run in runs)} alarms of {len(runs)} runs"
 
 
-def _standing(path: Path) -> Iterator[Kept]:
-    what = "witness's alarm"
-    try:
-        alarm = decode(Alarm, path.read_bytes())
-    except FileNotFoundError:
-        return
-    except OSError as error:
-        yield Kept(what, path, reason_of(error), "fail")
-    except MessageError:
-        change = "set it aside; the witness raises its alarm anew if it has a reason"
-        yield Kept(what, path, "it is damaged", "warn", change, path.unlink)
-    else:
-        yield Kept(what, path, f"{alarm.name} is {alarm.state}")
+def _standing(path: Path) -> str:
+    alarm = decode(Alarm, path.read_bytes())
+    return f"{alarm.name} is {alarm.state}"

@@ -104,9 +104,7 @@ class Problem:
             ends = np.array(self._cut.parts)[:, None]
             self.measured[np.arange(self._cut.length) >= ends] = np.nan
             beyond = int(rows.max()) + 1 - len(recording)
-            self._inputs = np.pad(self._inputs, ((0, beyond), (0, 0)), mode="edge")
-            self._spacing = np.pad(self._spacing, (0, beyond), mode="edge")
-            self._begins = np.pad(self._begins, (0, beyond), mode="edge")
+            self._inputs, self._spacing, self._begins = self._with_last_repeated(beyond)
         self.scale = np.nanstd(recording.outputs, axis=0) if scale is None else scale
         self.scale = np.where(self.scale > 0, self.scale, 1.0)
         begun = initial_states(system, recording)
@@ -273,9 +271,13 @@ class Problem:
     @cached_property
     def _and_next(self) -> tuple[FloatArray, FloatArray, IntArray]:
         """Inputs, spacing and begins, the last sample repeated: the last window has a next one."""
-        inputs = np.pad(self._inputs, ((0, 1), (0, 0)), mode="edge")
-        spacing = np.pad(self._spacing, (0, 1), mode="edge")
-        return inputs, spacing, np.pad(self._begins, (0, 1), mode="edge")
+        return self._with_last_repeated(1)
+
+    def _with_last_repeated(self, samples: int) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Inputs, spacing and begins, their last sample repeated."""
+        inputs = np.pad(self._inputs, ((0, samples), (0, 0)), mode="edge")
+        spacing = np.pad(self._spacing, (0, samples), mode="edge")
+        return inputs, spacing, np.pad(self._begins, (0, samples), mode="edge")
 
     def _scaled(
         self, outputs: FloatArray, slopes: FloatArray, rows: IntArray

@@ -97,10 +97,7 @@ def fit_nearby(found: Fit, prior: Prior, recording: Recording, horizon: int, sub
     """
     if found.continued:
         return _ContinuedWindows(found, recording, horizon, substeps).fitted(prior)
-    return fit(
-        found.compiled, recording, horizon, start=found.parameters, scale=found.scale,
-        initial=found.initial, substeps=substeps, prior=prior,
-    )  # fmt: skip
+    return _apart(found, recording, horizon, substeps, prior)
 
 
 @QUIET
@@ -117,13 +114,20 @@ def begun_anew_nearby(found: Fit, recording: Recording, horizon: int, substeps: 
     if not found.continued:
         return found
     try:
-        near = fit(
-            found.compiled, recording, horizon, start=found.parameters, scale=found.scale,
-            initial=found.initial, substeps=substeps,
-        )  # fmt: skip
+        near = _apart(found, recording, horizon, substeps)
     except ModelError:
         return found
     return replace(found, begun_anew=near)
+
+
+def _apart(
+    found: Fit, recording: Recording, horizon: int, substeps: int, prior: Prior | None = None
+) -> Fit:
+    """The optimum nearest to a fit of windows that all begin anew."""
+    return fit(
+        found.compiled, recording, horizon, start=found.parameters, scale=found.scale,
+        initial=found.initial, substeps=substeps, prior=prior,
+    )  # fmt: skip
 
 
 @QUIET
