@@ -71,7 +71,7 @@ def killed_at(root: Path, change: int) -> bool:
     return os.WIFSIGNALED(os.waitpid(child, 0)[1])
 
 
-@pytest.mark.parametrize("next_run", ["retain", "index"])
+@pytest.mark.parametrize("next_run", ["retain", pytest.param("index", marks=pytest.mark.nightly)])
 def test_thinning_killed_at_any_point_loses_nothing(
     root: Path, tmp_path: Path, next_run: str
 ) -> None:

@@ -56,7 +56,13 @@ def peak(rows: int, folder: Path, mapping: ImportMapping) -> int:
             made.unlink()
 
 
-@pytest.mark.parametrize("mapping", [MAPPED, ImportMapping()], ids=["mapped", "exported"])
+@pytest.mark.parametrize(
+    "mapping",
+    [
+        pytest.param(MAPPED, id="mapped"),
+        pytest.param(ImportMapping(), id="exported", marks=pytest.mark.nightly),
+    ],
+)
 def test_memory_does_not_grow_with_the_text(tmp_path: Path, mapping: ImportMapping) -> None:
     few, many = 4 * PART, 16 * PART
     peak(PART, tmp_path, mapping)  # what is imported once

@@ -63,6 +63,7 @@ def learnt(structure: Structure, record: Record) -> Reference:
     return reference(structure, record, UNDAMAGED)
 
 
+@pytest.mark.nightly
 def test_an_undamaged_nonlinear_structure_alarms_as_often_as_asked(
     file: Path, structure: Structure
 ) -> None:

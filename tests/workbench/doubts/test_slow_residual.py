@@ -75,7 +75,7 @@ def block(seed: int) -> dict[str, np.ndarray]:
     }
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_late_thermocouple_is_found_by_the_recordings_held_out(tmp_path: Path) -> None:
     study = studied(
         tmp_path, BLOCK, [block(2), block(3)], [block(4)], UNITS, "horizon = 320.0", [0.5] * 3

@@ -49,6 +49,7 @@ def recorded(folder: Path, **effects: float) -> Study:
     return study(folder)
 
 
+@pytest.mark.nightly
 def test_what_is_learned_holds_under_an_excitation_that_was_not_learned(
     tmp_path: Path,
     taught: tuple[Study, Data, FloatArray | None],

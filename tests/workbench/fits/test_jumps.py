@@ -51,6 +51,7 @@ def test_the_floor_counts_the_samples_that_it_is_given(bench):
     assert floor.ratio(held_out, loudest) < floor.ratio(held_out)
 
 
+@pytest.mark.nightly
 def test_strong_stick_slip_is_named_though_it_leaves_jumps():
     bench = opened(FORCE, "stribeck", 0.1)
     rows, verdict = ranking(bench)

@@ -77,6 +77,7 @@ def test_products_are_learned_from_any_excitation(taught: Taught, bare: Taught, 
     assert found.fitted.train_error < 0.5 * bare(seed).fitted.train_error
 
 
+@pytest.mark.nightly
 def test_what_is_learned_does_not_hinge_on_the_last_digits(
     healthy: Callable[[int], Case], taught: Taught
 ) -> None:
@@ -89,6 +90,7 @@ def test_what_is_learned_does_not_hinge_on_the_last_digits(
     assert found.fitted.train_error == pytest.approx(taught(2).fitted.train_error, rel=1e-3)
 
 
+@pytest.mark.nightly
 def test_the_order_of_terms_makes_no_difference(
     healthy: Callable[[int], Case], taught: Taught, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -69,7 +69,11 @@ def study_of(folder: Path, before: float, behind: float) -> Study:
 
 
 @pytest.mark.parametrize(
-    ("before", "behind", "side"), [(0.0, DEAD, "valve_hysteresis"), (DEAD, 0.0, "")]
+    ("before", "behind", "side"),
+    [
+        (0.0, DEAD, "valve_hysteresis"),
+        pytest.param(DEAD, 0.0, "", marks=pytest.mark.nightly),
+    ],
 )
 def test_the_side_of_the_play_on_which_a_dead_zone_lies_is_found_and_kept(
     tmp_path: Path, before: float, behind: float, side: str

@@ -65,6 +65,7 @@ def test_a_period_must_hold_whole_horizons(tmp_path):
 
 
 @pytest.mark.long
+@pytest.mark.nightly
 def test_two_faults_at_once_are_named_whichever_is_found_first(tmp_path):
     record(tmp_path, "healthy", 1)
     record(tmp_path, "rig", 2, viscous=0.15, acceleration_lag=0.002)

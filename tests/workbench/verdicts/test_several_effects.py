@@ -52,6 +52,7 @@ def test_one_of_three_hidden_effects_is_named_with_another(three, rows):
     assert set(found.beside) == LABELS - set(found.members)
 
 
+@pytest.mark.nightly
 def test_without_the_truth_among_them_no_effect_is_named_with_confidence(three):
     known = {"quadratic_drag", "dead_band", "lag", "delay", "digital_smoothing", "moving_average"}
     rest = {n: e for n, e in three.study.effects.items() if n not in known}
@@ -73,6 +74,7 @@ def test_what_the_best_set_leaves_is_told_if_something_else_is_missing_too():
     assert "coulomb@load" in verdict.text.partition(" together leave ")[0].rpartition("; ")[2]
 
 
+@pytest.mark.nightly
 def test_two_simple_effects_are_not_taken_for_one_with_a_shape():
     bench = hiding("coulomb", "quadratic_drag")
     _, verdict = ranking(bench)

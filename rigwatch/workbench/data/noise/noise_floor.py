@@ -8,6 +8,7 @@ that is less: missing physics may fill all bands.
 
 import math
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -40,6 +41,7 @@ BY_CHANCE = 0.1
 FEWEST_PERIODS = 3
 REPEATED = 2e-4
 """Mean square difference of an input one period later, relative to its own; rms 1 % of each."""
+_PERIODS: WeakKeyDictionary[Recording, int] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,8 +185,15 @@ def lowered(floor: NoiseFloor, study: Study, data: Data, fitted: Fit) -> NoiseFl
 def find_period(recording: Recording) -> int:
     """Period in samples after which all inputs that drive the rig repeat to 1 %; 0 if they do not.
 
-    Inputs of different periods repeat together after their least common multiple.
+    Inputs of different periods repeat together after their least common multiple. It is searched
+    for once a recording: each fit to it asks.
     """
+    if recording not in _PERIODS:
+        _PERIODS[recording] = _common_period(recording)
+    return _PERIODS[recording]
+
+
+def _common_period(recording: Recording) -> int:
     drive = recording.excitation.T
     periods = [period_by_correlation(signal, _allowed) for signal in drive]
     if not periods or not all(periods):
