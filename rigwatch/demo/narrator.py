@@ -38,6 +38,10 @@ NAMED = {NAMELESS: "alarm raised", "other_fault": "dry friction ruled out"}
 """What an alarm tells at its time, if that is not the fault's name."""
 OF_THE_RIG = (NAMELESS, "dry_friction", "stiction", "other_fault")
 """Alarms that answer to what is done to the rig; others are about its measuring chain."""
+OF_THE_CHAIN = (
+    "(about the measuring chain, and none of the faults announced: on a busy machine the simulated",
+    "device falls behind; further alarms of this kind are counted, and told on the dashboard)",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +118,7 @@ class Narrator:
         self._next = next(self._acts, None)
         self._last: Act | None = None
         self._ended: Alarm | None = None
+        self._told, self._untold = set[str](), 0
 
     def samples(self, seq: int) -> None:
         """Report the changes up to this sample."""
@@ -178,23 +183,36 @@ class Narrator:
         if alarm.state == "unacknowledged":
             if self._ended is not None and alarm.onset_seq <= self._ended.onset_seq:
                 self._ended = None  # the fault persists, under its name
-            self._say(f"{self._time(alarm.seq)} ALARM: {alarm.cause}{self._delay(alarm)}")
-            if alarm.name not in OF_THE_RIG:
-                self._say("            (about the measuring chain: none of the faults announced)")
-            self._advise(alarm)
+            self._tell(alarm)
             self.alarms.append(alarm)
-        elif alarm.name in {told.name for told in self.alarms} and alarm.state in ENDED:
+        elif alarm.name in self._told and alarm.state in ENDED:
             self._tell_end()
             self._ended = alarm
             if alarm.name != NAMELESS:
                 self._tell_end()
 
+    def end(self) -> None:
+        """Say how many alarms have not been told."""
+        if self._untold:
+            self._say(f"alarms about the measuring chain that were not told: {self._untold}")
+
+    def _tell(self, alarm: Alarm) -> None:
+        """Report an alarm; of those about the measuring chain only the first."""
+        of_the_chain = alarm.name not in OF_THE_RIG
+        if of_the_chain and self._told - set(OF_THE_RIG):
+            self._untold += 1
+            return
+        self._say(f"{self._time(alarm.seq)} ALARM: {alarm.cause}{self._delay(alarm)}")
+        for line in OF_THE_CHAIN if of_the_chain else ():
+            self._say(f"            {line}")
+        self._advise(alarm)
+        self._told.add(alarm.name)
+
     def _advise(self, alarm: Alarm) -> None:
         """Say once for each name what to do, and once where all alarms are listed."""
-        told = {earlier.name for earlier in self.alarms}
-        if alarm.name not in told:
+        if alarm.name not in self._told:
             self._say(f"            what to do: {alarm.guidance_for(self._config)}")
-        if self._attended and alarm.name != NAMELESS and told <= {NAMELESS}:
+        if self._attended and alarm.name != NAMELESS and self._told <= {NAMELESS}:
             self._say(f"            all alarms: $ rigwatch alarms {self._config}")
             self._say("            (an alarm is kept, even once its cause has gone, until somebody")
             self._say("            has said that it was seen: rigwatch ack)")
@@ -209,7 +227,7 @@ class Narrator:
             for line in more:
                 self._say(f"              {line}")
             self._say(f"            ({WHY_LATER})")
-            newest = self.alarms[-1].name if self.alarms else ""
+            newest = next((a.name for a in self.alarms[::-1] if a.name in OF_THE_RIG), "")
             # An explanation bears the name of the first alarm, which is mostly a departure.
             if newest == ALARM or event.text.startswith(ALARM):
                 force, times = f"{self._size * self._known:.2f} N", f"{self._size:.2f} times"

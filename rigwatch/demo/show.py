@@ -212,6 +212,7 @@ class Show:
         seconds = recording.samples / self._config.rig.sample_rate
         whole = "; ".join(recording.faults) or "none missing"
         session = relative(recording.path)
+        self._narrator.end()
         self._say(f"recording: {session}, {recording.samples} samples ({seconds:.0f} s), {whole}")
         for complaint in found:
             self._say(f"the demo did not succeed: {complaint}")

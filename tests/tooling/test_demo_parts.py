@@ -271,12 +271,29 @@ def test_an_alarm_about_the_measuring_chain_is_no_fault_of_the_plan() -> None:
     line = replace(alarm("stale", 5200), guidance="Run `rigwatch doctor CONFIG`.")
     narrator.alarm(line)
     assert "none of the faults announced" in said[2]
-    assert "rigwatch doctor rig.toml" in said[3]
+    assert "rigwatch doctor rig.toml" in said[4]
     narrator.alarm(replace(line, state="cleared_unacknowledged", seq=5300))
     assert any("Something else.: the condition has gone" in told for told in said)
     said.clear()
     narrator.alarm(alarm("other_fault", 6000))
     assert not any("none of the faults announced" in told for told in said)
+
+
+def test_of_alarms_about_the_measuring_chain_the_first_is_told_and_none_is_studied() -> None:
+    said: list[str] = []
+    narrator = narrator_to(said)
+    narrator.alarm(alarm("stale", 5000))
+    narrator.alarm(alarm("dry_friction", 5200))
+    narrator.alarm(alarm("stale", 5300))
+    narrator.alarm(alarm("alarm_flood", 5400))
+    narrator.alarm(alarm("alarm_flood", 5500, "normal"))
+    assert sum("ALARM: Something else." in line for line in said) == 1
+    assert not any("the condition has gone" in line for line in said)
+    missing = "dry_friction: probably missing: coulomb@load (dry surfaces): explains 99%"
+    narrator.explain(Event("monitor", 0, "error", PROBABLY_MISSING, missing))
+    assert any("rigwatch explain demo/studies/dry_friction-*" in line for line in said)
+    narrator.end()
+    assert said[-1] == "alarms about the measuring chain that were not told: 2"
 
 
 def test_a_whole_recording_with_the_alarm_has_nothing_to_complain_about(
