@@ -15,6 +15,7 @@ from rigwatch.workbench.data import (
     along_motion,
     expected_error,
     held_out_floor,
+    overstated,
     predicts_along_motion,
     prepare,
     quiet_scale,
@@ -69,7 +70,11 @@ def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:
     """
     check_data(study)
     study = with_horizon(study)
-    return determined_by_healthy(*with_row_order(study, prepare(study)))
+    study, data = with_row_order(study, prepare(study))
+    if study.file.noise:
+        remarks = overstated(study, quiet_scale(data.held_out))
+        data = replace(data, remarks=(*data.remarks, *remarks))
+    return determined_by_healthy(study, data)
 
 
 def determined_by_healthy(study: Study, data: Data) -> tuple[Study, Data, FloatArray | None]:

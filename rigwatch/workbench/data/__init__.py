@@ -12,6 +12,7 @@ from rigwatch.workbench.data.noise import (
     from_residual,
     held_out_floor,
     lowered,
+    overstated,
     quiet_scale,
 )
 from rigwatch.workbench.data.one_rate import ALIKE as RATES_ALIKE
@@ -47,6 +48,7 @@ __all__ = [
     "from_residual",
     "held_out_floor",
     "lowered",
+    "overstated",
     "parameters_of",
     "port_sizes",
     "predicts_along_motion",

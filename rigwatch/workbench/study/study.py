@@ -46,6 +46,7 @@ from rigwatch.workbench.study.recording_parameters import (
     known_in_si,
     known_of,
 )
+from rigwatch.workbench.study.stated_noise import noise_in_si
 from rigwatch.workbench.study.study_file import Accepted, StudyFile
 from rigwatch.workbench.study.told_units import with_shown_units
 
@@ -247,7 +248,10 @@ def _in_si(study: Study) -> Study:
         name: _width(_unit(study.model.parameters.get(name)), value)
         for name, value in study.file.deviation.items()
     }
-    file = structs.replace(study.file, start=start, deviation=widths, effects=tuple(effects))
+    noise = noise_in_si(study.file.noise, study.model)
+    file = structs.replace(
+        study.file, start=start, deviation=widths, noise=noise, effects=tuple(effects)
+    )
     return replace(study, file=file, model=with_known_values(study.model, file))
 
 

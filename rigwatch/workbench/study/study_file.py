@@ -121,6 +121,13 @@ class StudyFile(Section, frozen=True, kw_only=True):
             description="unit in which an output's errors are told, the model file's if not given"
         ),
     ] = field(default_factory=dict)
+    noise: Annotated[
+        dict[str, Annotated[float, Meta(gt=0)]],
+        Meta(
+            description="standard deviation of an output's noise in a sample, in the unit in which"
+            " it is shown, as from a data sheet: the noise floor where no recording tells it"
+        ),
+    ] = field(default_factory=dict)
     start: Annotated[
         dict[str, float],
         Meta(

@@ -10,6 +10,7 @@ from rigwatch.workbench.data.noise.noise_floor import (
     lowered,
     quiet_scale,
 )
+from rigwatch.workbench.data.noise.stated import overstated
 
 __all__ = [
     "METHODS",
@@ -19,5 +20,6 @@ __all__ = [
     "from_residual",
     "held_out_floor",
     "lowered",
+    "overstated",
     "quiet_scale",
 ]

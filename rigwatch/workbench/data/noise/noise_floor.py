@@ -1,9 +1,9 @@
 """The noise floor: the smallest error that can be reached, and how it is estimated.
 
 Repeated periods of the excitation are best: their differences are noise. Next best is a healthy
-recording, which also includes model error. Otherwise the quietest band of the residual, assumed to
-be white noise, gives a lower limit, or what does not repeat with an excitation of any period where
-that is less: missing physics may fill all bands.
+recording, which also includes model error, and then the noise that the study states. Otherwise the
+quietest band of the residual, assumed to be white noise, gives a lower limit, or what does not
+repeat with an excitation of any period where that is less: missing physics may fill all bands.
 """
 
 import math
@@ -17,6 +17,7 @@ from rigwatch.physics.transfer import period_by_correlation, shortest_period
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.workbench.data.noise.error_spectrum import ErrorSpectrum
 from rigwatch.workbench.data.noise.quietest_band import quietest_band
+from rigwatch.workbench.data.noise.stated import stated_rms
 from rigwatch.workbench.data.noise.unrepeated import unrepeated
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.study import Study
@@ -25,6 +26,7 @@ METHODS = {
     "periods": "differences between repeated periods of the excitation",
     "healthy": "the error of the model on a healthy recording",
     "healthy motion": "the error of the model along the motion of a healthy recording",
+    "stated": "the noise that the study states",
     "repeats": "what of the residual does not repeat with the excitation: a lower limit",
     "quiet band": "the quietest band of the residual, assumed to be white noise: a lower limit",
 }
@@ -32,6 +34,7 @@ ALLOWED = {
     "periods": 1.1,
     "healthy": 1.1,
     "healthy motion": 1.05,
+    "stated": 1.1,
     "repeats": 1.25,
     "quiet band": 1.25,
 }
@@ -162,9 +165,20 @@ def repeats_at_once(study: Study) -> bool:
 
 def held_out_floor(study: Study, data: Data, fitted: Fit) -> NoiseFloor:
     """The floor of a study's held-out recordings from the residual of a fit to them."""
-    return from_residual(
+    found = from_residual(
         fitted, data.held_out, study.file.period, data.horizon, at_once=repeats_at_once(study)
     )
+    # Along the measured motion, its noise is in the residual as well.
+    if data.along_motion or not found.lower_limit:
+        return found
+    return _with_stated(found, stated_rms(study, data.held_out))
+
+
+def _with_stated(floor: NoiseFloor, stated: FloatArray) -> NoiseFloor:
+    """The floor with the stated noise, NaN where there is none, in place of a lower limit."""
+    if np.isnan(stated).any():
+        return replace(floor, rms=np.where(np.isnan(stated), floor.rms, stated))
+    return NoiseFloor(stated, "stated")
 
 
 def lowered(floor: NoiseFloor, study: Study, data: Data, fitted: Fit) -> NoiseFloor:
