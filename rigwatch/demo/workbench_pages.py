@@ -52,4 +52,4 @@ def _tell(process: "subprocess.Popen[str]", say: Callable[[str], None]) -> None:
     line = process.stdout.readline()
     if line:
         address = json.loads(line)["address"]
-        say(f"  workbench: no page opens by itself; once an alarm has come, open {address}")
+        say(f"  workbench: once an alarm has come, open {address} in a browser")
