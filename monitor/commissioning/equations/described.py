@@ -6,7 +6,8 @@ below that frequency; faster motion is as unknown as motion of a size that was n
 
 Every recording tells how well its frequencies are described, by its power: what does not grow with
 the motion, as hysteresis of a valve, is a large part of a weak sweep and little of a strong drive
-at the same frequency.
+at the same frequency. The sensor's own noise tells nothing of the equations, although it may be
+half of what a weak sweep shows: its energy does not count.
 """
 
 from collections.abc import Sequence
@@ -40,17 +41,26 @@ class Left:
         name, role: of the recording.
         judged: its judged columns, see `missing_force`, shape (n, columns).
         pace: mean frequency of its motion, shape (n,) [Hz].
+        noise: of the sensor whose output is predicted, rms.
     """
 
     name: str
     role: str
     judged: FloatArray
     pace: FloatArray
+    noise: float
 
     def share(self, begin: int, end: int) -> float:
-        """Residual relative to what is measured; 0 of nothing."""
+        """Residual beyond the noise, relative to what is measured; 0 of nothing."""
         part = self.judged[begin:end]
-        return rms(part[:, E]) / max(rms(part[:, MEASURED]), 1e-12) if len(part) else 0.0
+        if not len(part):
+            return 0.0
+        beyond = self.beyond_noise(float(np.mean(part[:, E] ** 2)))
+        return float(np.sqrt(beyond)) / max(rms(part[:, MEASURED]), 1e-12)
+
+    def beyond_noise(self, energy: float) -> float:
+        """Mean square of a residual without the noise in it."""
+        return energy if np.isnan(energy) else max(energy - self.noise**2, 0.0)
 
     @property
     def held_out(self) -> int:
@@ -119,10 +129,11 @@ def _fastest(recordings: Sequence[Left], rate: float) -> float:
     windows = _windows(recordings, rate)
     for top in np.sort(np.concatenate([one[0] for one in windows]))[::-1]:
         error = size = 0.0
-        for paces, errors, sizes in windows:
+        for one, (paces, errors, sizes) in zip(recordings, windows, strict=True):
             band = (paces <= top) & (paces >= top / BAND)
             if band.any():
-                error, size = error + errors[band].mean(), size + sizes[band].mean()
+                error += one.beyond_noise(float(errors[band].mean()))
+                size += sizes[band].mean()
         if error <= DESCRIBED**2 * size:
             return float(top)
     return 0.0
