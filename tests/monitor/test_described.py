@@ -82,6 +82,13 @@ def test_noise_of_the_sensor_in_a_weak_sweep_refuses_no_rig(noise: float) -> Non
     assert found.share < 0.12
 
 
+def test_a_sensor_that_shows_only_noise_refuses_a_rig() -> None:
+    one = replace(tone(8.0, 0.99), noise=1.0)
+
+    with pytest.raises(ModelError, match="leave 99 %"):
+        described([one], "rig", RATE)
+
+
 def test_noise_hides_no_fast_motion_that_is_not_described() -> None:
     one = replace(sweep(0.4), noise=0.25)
     one.judged[:, E] += 0.25 * np.random.default_rng(4).standard_normal(N)

@@ -7,7 +7,7 @@ below that frequency; faster motion is as unknown as motion of a size that was n
 Every recording tells how well its frequencies are described, by its power: what does not grow with
 the motion, as hysteresis of a valve, is a large part of a weak sweep and little of a strong drive
 at the same frequency. The sensor's own noise tells nothing of the equations, although it may be
-half of what a weak sweep shows: its energy does not count.
+half of what a weak sweep shows: its energy does not count, unless hardly anything else is measured.
 """
 
 from collections.abc import Sequence
@@ -23,6 +23,8 @@ WORST = 0.2
 """Relative residual on held-out healthy data above which the equations are refused."""
 DESCRIBED = 0.1
 """Relative residual of a band of frequencies up to which they describe it."""
+SHOWS = 2.0
+"""Energy of what is measured, relative to its sensor's noise, from which on it shows the motion."""
 BAND = 1.2
 """Ratio of a band's ends."""
 WINDOW = 1.0
@@ -51,16 +53,19 @@ class Left:
     noise: float
 
     def share(self, begin: int, end: int) -> float:
-        """Residual beyond the noise, relative to what is measured; 0 of nothing."""
+        """Residual relative to what is measured, both beyond the noise; 0 of nothing."""
         part = self.judged[begin:end]
         if not len(part):
             return 0.0
-        beyond = self.beyond_noise(float(np.mean(part[:, E] ** 2)))
-        return float(np.sqrt(beyond)) / max(rms(part[:, MEASURED]), 1e-12)
+        left, shown = self.beyond_noise(*np.mean(part[:, [E, MEASURED]] ** 2, axis=0).tolist())
+        return float(np.sqrt(left / max(shown, 1e-24)))
 
-    def beyond_noise(self, energy: float) -> float:
-        """Mean square of a residual without the noise in it."""
-        return energy if np.isnan(energy) else max(energy - self.noise**2, 0.0)
+    def beyond_noise(self, left: float, shown: float) -> tuple[float, float]:
+        """Mean squares of the residual and of what is measured, without the noise in both."""
+        noise = self.noise**2
+        if shown < SHOWS * noise:
+            return left, shown
+        return max(left - noise, 0.0), shown - noise
 
     @property
     def held_out(self) -> int:
@@ -132,8 +137,8 @@ def _fastest(recordings: Sequence[Left], rate: float) -> float:
         for one, (paces, errors, sizes) in zip(recordings, windows, strict=True):
             band = (paces <= top) & (paces >= top / BAND)
             if band.any():
-                error += one.beyond_noise(float(errors[band].mean()))
-                size += sizes[band].mean()
+                left, shown = one.beyond_noise(errors[band].mean(), sizes[band].mean())
+                error, size = error + left, size + shown
         if error <= DESCRIBED**2 * size:
             return float(top)
     return 0.0
