@@ -12,7 +12,8 @@ name.
 The first alarm raised while no other is unacknowledged is the first-out. In a flood (`flood.py`)
 further alarms are journalled but announced only as events until the flood ends; critical alarms and
 those that require stopping the rig are always shown. A chattering alarm is one alarm with a count
-(`flapping.py`).
+(`flapping.py`). The value of some becomes better while they stand and is told again
+(`telling_again.py`).
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -33,6 +34,7 @@ from monitor.alarms.operator import addressed, refusal
 from monitor.alarms.record import AlarmRecord
 from monitor.alarms.restoring import let_go, restore_from
 from monitor.alarms.state import UNSEEN, AlarmInstance, Occasion
+from monitor.alarms.telling_again import told_again
 from monitor.signals import Condition
 from rigwatch.wire.arrays import IntArray
 from rigwatch.wire.messages import NOT_PROVED, Alarm, AlarmCommand, Event, Identity
@@ -97,13 +99,19 @@ class AlarmManager:
             conditions: each over the same n samples; one that is missing keeps its level.
         """
         self._follow(boot, seq, len(t_ns))
+        held = list(conditions)
+        improving = [condition for condition in held if condition.improves]
         for index, name, rising, at in sorted(
-            self._edges(device, boot, seq, t_ns, conditions), key=lambda row: row[:2]
+            self._edges(device, boot, seq, t_ns, held), key=lambda row: row[:2]
         ):
+            self._tell_again(improving, boot, seq, t_ns[:index])
             self._advance(int(t_ns[index]))
             self._set(name[1], at, active=rising)
+        self._tell_again(improving, boot, seq, t_ns)
         if len(t_ns):
             self._advance(int(t_ns[-1]))
+            # What was raised by what has ended in between.
+            self._tell_again(improving, boot, seq, t_ns)
         return self._take_announcements()
 
     def report(self, name: str, at: Occasion, *, active: bool) -> list[Announcement]:
@@ -271,6 +279,26 @@ class AlarmManager:
                     float(condition.low[i]), float(condition.high[i]), edge.onset_seq,
                 )  # fmt: skip
                 yield i, (order_of(name), name), edge.rising, at
+
+    def _tell_again(
+        self, improving: Iterable[Condition], boot: int, seq: int, t_ns: IntArray
+    ) -> None:
+        """Tell values again that have become better in the first samples of these conditions."""
+        for condition in improving:
+            alarm = self._alarms.get(condition.name)
+            part = condition._replace(
+                active=condition.active[: len(t_ns)], value=condition.value[: len(t_ns)]
+            )
+            while alarm and alarm.active and alarm.state == "unacknowledged":
+                index = told_again(alarm, part, t_ns)
+                if index is None:
+                    break
+                self._advance(int(t_ns[index]))
+                alarm.occasion = replace(
+                    alarm.occasion, boot=boot, seq=seq + index, t_ns=int(t_ns[index]),
+                    value=float(part.value[index]),
+                )  # fmt: skip
+                self._publish(alarm, alarm.occasion.t_ns)
 
     def _alarm(self, name: str) -> AlarmInstance:
         if name not in self._alarms:

@@ -25,6 +25,7 @@ def restore_from(alarm: AlarmInstance, record: AlarmRecord) -> None:
         said.device, said.boot, said.seq, said.t_ns, said.value, said.low, said.high,
         said.onset_seq, alarm.added_to(said.cause),
     )  # fmt: skip
+    alarm.since_ns = said.t_ns
 
 
 def let_go(alarm: AlarmInstance) -> str:

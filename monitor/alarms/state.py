@@ -65,7 +65,8 @@ class AlarmInstance:
         superseded: an alarm that refines it has replaced it in this episode.
         first_out: it was raised while no other alarm was unacknowledged.
         grouped: it is hidden in a flood.
-        occasion: what raised it.
+        occasion: what raised it, or its value told again.
+        since_ns: when it was raised [ns].
         flaps: recent occurrences.
     """
 
@@ -81,6 +82,7 @@ class AlarmInstance:
     first_out: bool = False
     grouped: bool = False
     occasion: Occasion = field(default_factory=Occasion)
+    since_ns: int = 0
     flaps: FlapWatch = field(default_factory=FlapWatch)
 
     def __post_init__(self) -> None:
@@ -116,6 +118,7 @@ class AlarmInstance:
         self.state = "acknowledged" if self.is_remark else "unacknowledged"
         self.latched = self.settings.latch and not self.is_remark
         self.first_out, self.occasion = first_out, occasion
+        self.since_ns = occasion.t_ns
 
     def clear(self) -> bool:
         """The condition has become false; returns whether the published state changed."""

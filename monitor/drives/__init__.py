@@ -10,6 +10,7 @@ from monitor.drives.held_readings import HeldReadings
 from monitor.drives.input_steps import InputSteps, Steps
 from monitor.drives.jittered_edges import JitteredEdges
 from monitor.drives.jittered_steps import Jittered, JitteredSteps
+from monitor.drives.read_instants import follow_instants, no_instants, still_unsure
 from monitor.drives.recorded_drives import (
     BANDS,
     DriveBands,
@@ -41,8 +42,11 @@ __all__ = [
     "corrected",
     "edges_unsure",
     "follow_edges",
+    "follow_instants",
     "no_edges",
+    "no_instants",
     "same_drive",
     "steady_energies",
+    "still_unsure",
     "undecided",
 ]

@@ -30,6 +30,8 @@ class Steps(NamedTuple):
         mean: its mean until the next sample; 0 with too few samples.
         known: False while its steps slide and their clock is not yet known.
         unsure: uncertainty of the instants of its steps [samples].
+        jitters: whether that is of edges that jitter at the time, so that the motion shows how far
+            they are from where they are read, see `read_instants`.
         moved: what the mean gains if edges lie between samples, see `sliding_edges`, or if steps
             jitter, see `jittered_steps`.
         moves: whether that is known.
@@ -38,6 +40,7 @@ class Steps(NamedTuple):
     mean: FloatArray
     known: BoolArray
     unsure: FloatArray
+    jitters: BoolArray
     moved: FloatArray
     moves: BoolArray
 
@@ -62,16 +65,17 @@ class InputSteps:
         """The next samples of the input, shape (n,), with states of the admission."""
         slides = self._sliding.update(signal, code)
         found = self._jittered.update(signal, code)
-        edges = self._edges.update(signal, code) | self._held.update(signal, code)
+        edges, held = self._edges.update(signal, code), self._held.update(signal, code)
         regular = self._regular.update(signal, code)
         # Steps that slide and jitter do the latter only where they meet the samples.
         jitters = np.where(slides.followed, found.shows, found.jitters) & ~regular.shows
         mean = np.where(regular.shows, regular.held, slides.mean)
         known = slides.known | jitters | regular.shows
-        unsure = np.where(edges, EDGES, np.where(jitters, JITTER, 0.0))
+        unsure = np.where(edges.unsure | held, EDGES, np.where(jitters, JITTER, 0.0))
+        read = edges.jitters & ~held & ~jitters & ~regular.shows
         unsure = np.where(regular.shows, regular.unsure, unsure)
         if self._jitters:
             mean = np.where(jitters, found.value, mean)
-            return Steps(mean, known, unsure, regular.gained, regular.shows)
+            return Steps(mean, known, unsure, read, regular.gained, regular.shows)
         moved = np.where(jitters, found.value - mean, regular.gained)
-        return Steps(mean, known, unsure, moved, regular.shows | jitters)
+        return Steps(mean, known, unsure, read, moved, regular.shows | jitters)

@@ -11,6 +11,8 @@ over the samples. Where between samples they are cannot be told, as it can be of
 # Compiled functions are untyped to mypy.
 # mypy: disable-error-code="no-any-return"
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,27 +29,42 @@ REMEMBERED = 1024.0
 """Samples for which edges are taken to do so after they have shown it."""
 
 
+class Instants(NamedTuple):
+    """The edges of an input, both of shape (n,).
+
+    Attributes:
+        unsure: whether they jitter or slide, or have done so lately.
+        jitters: whether the last ones jitter.
+    """
+
+    unsure: BoolArray
+    jitters: BoolArray
+
+
 class JitteredEdges:
     """Follows one input, block by block."""
 
     def __init__(self) -> None:
         self._intervals = np.zeros((2, COUNT))
-        self._ways = np.zeros((2, 2))
+        self._ways = np.zeros((2, 3))
         self._kept = np.zeros(4)
 
-    def update(self, signal: FloatArray, code: Codes) -> BoolArray:
-        """Whether its edges jitter or slide, shape (n,), with states of the admission."""
-        found = np.zeros(code.size, np.bool_)
-        _advance(np.ascontiguousarray(signal), code, self._intervals, self._ways, self._kept, found)
+    def update(self, signal: FloatArray, code: Codes) -> Instants:
+        """The next samples of the input, shape (n,), with states of the admission."""
+        found = Instants(np.zeros(code.size, np.bool_), np.zeros(code.size, np.bool_))
+        carried = self._intervals, self._ways, self._kept
+        _advance(np.ascontiguousarray(signal), code, *carried, *found)
         return found
 
 
 AGE, AGO = LARGEST + 1, LARGEST + 2
 """Carried figures beside those of `edge`: samples since the last, and since edges jittered."""
-OWN_AGE, FILLED = range(2)
-"""Carried figures of edges that rise and of those that fall: age of the last, and number of
-intervals, below 0 without an edge.
+OWN_AGE, FILLED, JITTER = range(3)
+"""Carried figures of edges that rise and of those that fall: age of the last, number of intervals,
+below 0 without an edge, and whether these jitter.
 """
+GOES_ON = 2.0
+"""Time without an edge up to which the wave goes on [intervals]."""
 
 
 @kernel()
@@ -57,7 +74,8 @@ def _advance(  # noqa: PLR0917 -- a kernel
     intervals: FloatArray,
     ways: FloatArray,
     kept: FloatArray,
-    found: NDArray[np.bool_],
+    unsure: NDArray[np.bool_],
+    jitters: NDArray[np.bool_],
 ) -> None:
     for k in range(code.size):
         if code[k] == RESTART or code[k] == NEW_BOOT:
@@ -79,12 +97,20 @@ def _advance(  # noqa: PLR0917 -- a kernel
                 way = 1 if step > 0.0 else 0
                 _edge(intervals[way], ways[way], kept)
             kept[AGE] = 0.0
-        found[k] = kept[AGO] < REMEMBERED
+        unsure[k] = kept[AGO] < REMEMBERED
+        jitters[k] = _still(intervals[0], ways[0]) or _still(intervals[1], ways[1])
 
 
 @part()
 def _forget(ways: FloatArray) -> None:
     ways[0, FILLED] = ways[1, FILLED] = -1.0
+    ways[0, JITTER] = ways[1, JITTER] = 0.0
+
+
+@part()
+def _still(intervals: FloatArray, own: FloatArray) -> bool:
+    """Whether the last edges of one way jitter, and the wave goes on."""
+    return own[JITTER] > 0.0 and own[OWN_AGE] <= GOES_ON * intervals[-1]
 
 
 @part()
@@ -94,7 +120,8 @@ def _edge(intervals: FloatArray, own: FloatArray, kept: FloatArray) -> None:
         push(intervals, own[OWN_AGE])
     own[FILLED] = min(own[FILLED] + 1.0, float(COUNT))
     own[OWN_AGE] = 0.0
-    if own[FILLED] == COUNT and (_lone(intervals) or _jitter(intervals)):
+    own[JITTER] = 1.0 if own[FILLED] == COUNT and _jitter(intervals) else 0.0
+    if own[JITTER] > 0.0 or (own[FILLED] == COUNT and _lone(intervals)):
         kept[AGO] = 0.0
 
 

@@ -108,7 +108,9 @@ class HealthyLimits(Section, frozen=True, kw_only=True):
         Floats, Meta(description="mean frequency of each steady healthy motion [Hz]")
     ] = ()
     steady_sizes: Annotated[Floats, Meta(description="size of each, as in the range")] = ()
-    steady_narrow: Annotated[Floats, Meta(description="narrowness of each")] = ()
+    steady_narrow: Annotated[
+        Floats, Meta(description="narrowness of each; 0 of one that drifts, known by its drive")
+    ] = ()
     steady_drives: Annotated[
         Floats, Meta(description="pace of the drive of each: 2 sin of twice its phase a sample")
     ] = ()

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from monitor.drives import no_edges
+from monitor.drives import no_edges, no_instants
 from monitor.model import HealthyLimits
 from monitor.observer.input_lateness import no_lateness
 from monitor.observer.missing_force import high_pass
@@ -78,6 +78,7 @@ class DecisionState(NamedTuple):
         sums: over a motion that was not recorded, shape (SUMS,).
         lateness: of the inputs, see `input_lateness`.
         edges: of the inputs, see `monitor.drives.edge_choice`.
+        instants: of edges that jitter, see `monitor.drives.read_instants`.
     """
 
     rows: FloatArray
@@ -87,6 +88,7 @@ class DecisionState(NamedTuple):
     sums: FloatArray
     lateness: FloatArray
     edges: FloatArray
+    instants: FloatArray
 
 
 def new_state(levels: int) -> DecisionState:
@@ -100,7 +102,8 @@ def new_state(levels: int) -> DecisionState:
     count[AT.since_jump] = WAKE
     rows = np.zeros((HISTORY, LEVELS + levels))
     lasting, sums = np.zeros(LASTING), np.zeros(SUMS)
-    return DecisionState(rows, count, np.zeros(4), lasting, sums, no_lateness(), no_edges())
+    inputs = no_lateness(), no_edges(), no_instants()
+    return DecisionState(rows, count, np.zeros(4), lasting, sums, *inputs)
 
 
 PASSED = np.array([[1.0, 0.0, 0.0]] * 2)

@@ -29,10 +29,11 @@ COLUMNS = (
 )  # fmt: skip
 (
     E, DRY_UNIT, VISCOUS_UNIT, PREDICTED, DISAGREE, MEASURED, WEAK, LATE_UNIT, MOVED, UNSURE_INPUT,
-    DRY_BARE, JUDGED,
-) = range(12)  # fmt: skip
-"""Judged columns: those above, high-passed, s for what is not known of the inputs' instants, and g1
-without the high-pass; and their number.
+    DRY_BARE, JITTERS, JUDGED,
+) = range(13)  # fmt: skip
+"""Judged columns: those above, high-passed, s for what is not known of the inputs' instants, g1
+without the high-pass, and whether edges jitter, so that the residual shows their instants; and
+their number.
 """
 WEAKER, LATER = 0.05, 0.5
 """Loss of the inputs of which the response is taken, and their lateness [samples]."""

@@ -158,16 +158,18 @@ class LaggedSignals:
         if self._held is not None:
             filled = columns[:, : len(self._inputs)] - self._held.update(signals, code)[0]
         known, unsure = np.ones(code.size, np.bool_), np.zeros(code.size)
+        jitters = np.ones(code.size, np.bool_)
         moved, moves = np.zeros((code.size, len(self._inputs))), np.zeros(code.size, np.bool_)
         for place, steps in enumerate(self._inputs):
             found = steps.update(signals[:, place], code)
             columns[:, place] = np.where(state == EMPTY, 0.0, found.mean + filled[:, place])
             known &= found.known
             unsure = np.maximum(unsure, found.unsure)
+            jitters &= found.jitters | (found.unsure == 0.0)
             moved[:, place] = np.where(found.moves, found.moved, 0.0)
             moves |= found.moves
         mean = columns[:, : len(self._inputs)]
-        return columns, state, Steps(mean, known, unsure, moved, moves)
+        return columns, state, Steps(mean, known, unsure, jitters & (unsure > 0.0), moved, moves)
 
 
 class ObserverSignals:
@@ -232,7 +234,8 @@ class ObserverSignals:
             )
         )  # fmt: skip
         judged = self._high_passed.update(raw, z, np.stack(changed), state)
-        judged = np.column_stack([judged, steps.unsure * judged[:, LATE_UNIT], predicted.dry])
+        unsure = steps.unsure * judged[:, LATE_UNIT]
+        judged = np.column_stack([judged, unsure, predicted.dry, steps.jitters])
         drives = [own.update(signals[:, place], code) for place, own in enumerate(self._drives)]
         for own in drives:
             steady &= ~own.changed

@@ -16,7 +16,14 @@ sensors agree with each other.
 import numpy as np
 from numpy.typing import NDArray
 
-from monitor.drives import corrected, edges_unsure, follow_edges, undecided
+from monitor.drives import (
+    corrected,
+    edges_unsure,
+    follow_edges,
+    follow_instants,
+    still_unsure,
+    undecided,
+)
 from monitor.observer.decision_state import (
     AMPLITUDE,
     ARMING,
@@ -74,7 +81,14 @@ from monitor.observer.input_lateness import (
     unsure_lateness,
 )
 from monitor.observer.lagged_motion import EMPTY, FIRST, TAINTED
-from monitor.observer.missing_force import DRY_BARE, LATE_UNIT, MOVED, UNSURE_INPUT, E
+from monitor.observer.missing_force import (
+    DRY_BARE,
+    JITTERS,
+    LATE_UNIT,
+    MOVED,
+    UNSURE_INPUT,
+    E,
+)
 from monitor.observer.window_statistics import (
     SEEN,
     add_unrecorded,
@@ -174,6 +188,7 @@ def _restart(kept: DecisionState) -> None:
     kept.value[0] = UNNAMED
     forget_lateness(kept.lateness)
     fill(kept.edges, 0.0)
+    fill(kept.instants, 0.0)
 
 
 @part()
@@ -215,11 +230,15 @@ def _follow_inputs(
     judging = count[WAS_JUDGING] == 1
     calm = count[ONSET] < 0
     largest = min(rules.medium / rules.lasting, usual[USUAL_MEDIUM])
-    variance = _variance(kept, rules) if calm or not judging else 0.0
+    healthy = _healthy_variance(kept, rules) if calm or not judging else 0.0
+    variance = healthy + mean_square(kept, LATENESS, MEDIUM)
     if calm and follow_edges(row[E], row[MOVED], row[UNSURE_INPUT], largest * variance, kept.edges):
         forget_lateness(kept.lateness)
         count[CHANGED] = 0
     row[E] = corrected(row[E], row[MOVED], kept.edges)
+    if not judging or (calm and count[ABOVE] == 0):
+        unsure, jitters = row[UNSURE_INPUT], row[JITTERS] > 0.0
+        follow_instants(row[E], unsure, jitters, healthy, judging, kept.instants)
     count[KNOWN_AGO] = 0 if np.isinf(usual[USUAL_MEDIUM]) else count[KNOWN_AGO] + 1
     anew = 0 < count[KNOWN_AGO] <= LONG
     moves = is_late(kept.lateness) or slides(kept.lateness)
@@ -242,7 +261,8 @@ def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatA
     late = kept.lateness[TAU] * row[LATE_UNIT]
     kept.rows[head, ERROR] = row[ERROR] - late
     unsure = UNSURE * unsure_lateness(kept.lateness) * row[LATE_UNIT]
-    kept.rows[head, LATENESS] = np.hypot(unsure, row[UNSURE_INPUT])
+    read = still_unsure(row[UNSURE_INPUT], kept.instants)
+    kept.rows[head, LATENESS] = np.hypot(unsure, read)
     kept.rows[head, SPEED], kept.rows[head, BARE] = speed, row[DRY_BARE]
     kept.rows[head, UNDECIDED] = undecided(row[MOVED], kept.edges)
     for c in range(levels.size):
@@ -381,7 +401,13 @@ def _sure(deviation: float, known: float, kept: DecisionState) -> bool:
 
 @part()
 def _variance(kept: DecisionState, rules: DecisionRules) -> float:
-    """Healthy variance of the residual for the motion of the medium window."""
+    """Healthy variance of the residual in the medium window."""
+    return _healthy_variance(kept, rules) + mean_square(kept, LATENESS, MEDIUM)
+
+
+@part()
+def _healthy_variance(kept: DecisionState, rules: DecisionRules) -> float:
+    """The same for its motion, if the instants of the inputs are known."""
     n = min(MEDIUM, kept.counts[FILLED])
     total = rules.noise**2
     for c in range(rules.growth.size):
@@ -389,7 +415,7 @@ def _variance(kept: DecisionState, rules: DecisionRules) -> float:
         for ago in range(1, n + 1):
             level += kept.rows[(kept.counts[HEAD] - ago) % HISTORY, LEVELS + c]
         total += rules.growth[c] * level / max(n, 1)
-    return total + mean_square(kept, LATENESS, MEDIUM)
+    return total
 
 
 @part()

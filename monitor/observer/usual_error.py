@@ -5,8 +5,9 @@ motion that was recorded at commissioning is therefore compared with what was le
 which is far less than the worst of all motions. A smaller motion of the same kind, as faults of the
 drive cause, leaves no more than that. Under a drive that was recorded a healthy rig moves as it did
 then, so that any other steady motion is compared with that recording as well, and that its size is
-another one is evidence of a change by itself. Of all others, and while the motion changes, the
-extremes of a healthy rig are not known.
+another one is evidence of a change by itself. A mass that drifts aside while it oscillates, as by a
+wave whose edges jitter, is only known by that drive. Of all others, and while the motion changes,
+the extremes of a healthy rig are not known.
 """
 
 from collections.abc import Iterator
@@ -33,6 +34,10 @@ RIPPLE = 2.0
 """Ratio of the spectrum's own ripple to them, above which its motion changes."""
 NARROWEST = 2.0
 """Narrowness above which a spectrum is not determined."""
+DRIFTS = 0.0
+"""Narrowness of a motion that drifts, of which it varies, as does the mean frequency: only its
+drive tells it from others.
+"""
 STEADY = 0.9
 """Share of a recording that is the same motion as its median, if it is a steady one."""
 STEEPEST = 6.0
@@ -51,6 +56,10 @@ class Extremes(NamedTuple):
     friction: float = np.inf
 
 
+NO_DRIVE = (0.0,) * BANDS
+"""Energies of a drive that is not a steady one."""
+
+
 class Motion(NamedTuple):
     """A steady motion, the extremes of its healthy residual, and energies of the drive's bands.
 
@@ -62,7 +71,7 @@ class Motion(NamedTuple):
     narrow: float
     drive: float
     extremes: Extremes
-    bands: tuple[float, ...] = (0.0,) * BANDS
+    bands: tuple[float, ...] = NO_DRIVE
 
 
 class Usual(NamedTuple):
@@ -104,7 +113,7 @@ class UsualError:
         settled = steady & (np.abs(seen.size - smooth.size) <= SIZE * smooth.size)
         found, smaller, driven = np.zeros((3, len(Extremes._fields), seen.pace.size))
         for motion in self._known:
-            alike, ratio = _alike(smooth, drive, motion), smooth.size / motion.size
+            alike, ratio = _alike(smooth, drive, bands, motion), smooth.size / motion.size
             same = alike & (np.abs(ratio - 1.0) <= SIZE)
             found[:, same] = np.maximum(found[:, same], np.array(motion.extremes)[:, None])
             less = alike & (ratio >= SMALLEST) & (ratio < 1.0 - SIZE)
@@ -133,7 +142,11 @@ class UsualError:
 
 
 def steady_motion(
-    seen: Spectrum, drive: FloatArray, extremes: Extremes, rate: float
+    seen: Spectrum,
+    drive: FloatArray,
+    extremes: Extremes,
+    rate: float,
+    bands: tuple[float, ...] = (),
 ) -> Motion | None:
     """The motion of a recording, None if it changes or is too short.
 
@@ -142,14 +155,18 @@ def steady_motion(
         drive: the pace of the drive after the start.
         extremes: of the recording's residual.
         rate: sample rate [Hz].
+        bands: energies of the drive, if it is a steady one.
     """
     if seen.pace.size == 0:
         return None
     smooth = _Smooth(rate).update(seen)
     pace, size, narrow = (float(np.median(x)) for x in (smooth.pace, smooth.size, smooth.narrow))
-    middle = Motion(pace, size, narrow, float(np.median(drive)), extremes)
-    steady = size > 0.0 and float(np.mean(_same(smooth, drive, middle))) >= STEADY
-    return middle if steady else None
+    middle = Motion(pace, size, narrow, float(np.median(drive)), extremes, bands or NO_DRIVE)
+    as_large = np.abs(smooth.size - size) <= SIZE * size
+    if size > 0.0 and np.mean(as_large & _of_kind(smooth, drive, middle)) >= STEADY:
+        return middle
+    drifts = size > 0.0 and np.mean(as_large & _as_driven(drive, middle)) >= STEADY
+    return middle._replace(narrow=DRIFTS) if bands and drifts else None
 
 
 class _Smooth:
@@ -172,7 +189,7 @@ def _known(limits: HealthyLimits) -> Iterator[Motion]:
     # Model files of earlier versions do not tell drives apart, and have the lasting energy only.
     count = len(limits.steady_paces)
     drives = limits.steady_drives or (0.0,) * count
-    bands = np.reshape(limits.steady_motion_bands or (0.0,) * count * BANDS, (-1, BANDS))
+    bands = np.reshape(limits.steady_motion_bands or NO_DRIVE * count, (-1, BANDS))
     spectra = limits.steady_paces, limits.steady_sizes, limits.steady_narrow
     shapes = zip(*spectra, drives, strict=True)
     windows = limits.steady_shorts, limits.steady_mediums, limits.steady_frictions
@@ -205,13 +222,21 @@ def _no_more(known: Extremes, ratio: FloatArray) -> FloatArray:
     )
 
 
-def _same(seen: Spectrum, drive: FloatArray, motion: Motion) -> NDArray[np.bool_]:
-    near = np.abs(seen.size - motion.size) <= SIZE * motion.size
-    return np.asarray(near & _alike(seen, drive, motion))
-
-
-def _alike(seen: Spectrum, drive: FloatArray, motion: Motion) -> NDArray[np.bool_]:
+def _alike(
+    seen: Spectrum, drive: FloatArray, bands: FloatArray, motion: Motion
+) -> NDArray[np.bool_]:
     """Whether a motion is the same but for its size."""
+    if motion.narrow == DRIFTS:
+        return _as_driven(drive, motion) & _driven(bands, motion)
+    return _of_kind(seen, drive, motion)
+
+
+def _of_kind(seen: Spectrum, drive: FloatArray, motion: Motion) -> NDArray[np.bool_]:
     near = np.abs(seen.pace - motion.pace) <= PACE * motion.pace
-    near &= (np.abs(drive - motion.drive) <= DRIVE * motion.drive) | (motion.drive == 0.0)
-    return np.asarray(near & (np.abs(seen.narrow - motion.narrow) <= NARROW))
+    near &= np.abs(seen.narrow - motion.narrow) <= NARROW
+    return near & _as_driven(drive, motion)
+
+
+def _as_driven(drive: FloatArray, motion: Motion) -> NDArray[np.bool_]:
+    near = np.abs(drive - motion.drive) <= DRIVE * motion.drive
+    return np.asarray(near | (motion.drive == 0.0))

@@ -214,7 +214,13 @@ class ObserverMonitor:
         waited = self._waited(seen)[at:]
         return (
             above(kinds.DEPARTURE, armed & (kept[d.DEPARTED] > 0.0), kept[d.DEVIATION], 1.0),
-            above(kinds.DRY_FRICTION, started & ((verdict == d.FRICTION) | sticks), force, 0.0),
+            above(
+                kinds.DRY_FRICTION,
+                started & ((verdict == d.FRICTION) | sticks),
+                force,
+                0.0,
+                improves=True,
+            ),
             above(kinds.STICTION, armed & sticks, kept[d.REST], 0.5),
             above(kinds.OTHER_FAULT, armed & (verdict == d.OTHER), kept[d.SHARE], np.inf),
             above(kinds.EXCITATION_CHANGED, never, lost * 0.0, 0.0),

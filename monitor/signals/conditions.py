@@ -131,6 +131,8 @@ class Condition(NamedTuple):
         value: the judged quantity, shape (n,), in the kind's unit; NaN if not judged.
         low: lower limit of `value`, shape (n,); -inf if there is none.
         high: upper limit of `value`, shape (n,); +inf if there is none.
+        improves: whether `value` is a figure that gets better while the condition holds, so that
+            its alarm tells it again.
     """
 
     name: str
@@ -138,14 +140,20 @@ class Condition(NamedTuple):
     value: NDArray[np.float64]
     low: NDArray[np.float64]
     high: NDArray[np.float64]
+    improves: bool = False
 
 
 def above(
-    name: str, active: NDArray[np.bool_], value: NDArray[np.float64], high: float
+    name: str,
+    active: NDArray[np.bool_],
+    value: NDArray[np.float64],
+    high: float,
+    *,
+    improves: bool = False,
 ) -> Condition:
     """A condition that holds above an upper limit; its arrays are read only."""
-    n = active.size
-    return Condition(name, active.view(np.uint8), value, level(n, -np.inf), level(n, float(high)))
+    low, limit = level(active.size, -np.inf), level(active.size, float(high))
+    return Condition(name, active.view(np.uint8), value, low, limit, improves)
 
 
 def below(

@@ -16,7 +16,14 @@ from rigwatch.archive.store import Store, Stored
 from rigwatch.archive.tables import write_seconds
 from rigwatch.batch import content_hash
 from rigwatch.wire.errors import SessionError
-from rigwatch.wire.messages import PROBABLY_MISSING, EstimateBlock, Event, Gap, Message
+from rigwatch.wire.messages import (
+    PROBABLY_MISSING,
+    EstimateBlock,
+    Event,
+    Gap,
+    Message,
+    transitions,
+)
 from rigwatch.wire.session import SUFFIX, Session, Summary, is_segment, open_session, summarise
 
 OK, DAMAGED, UNFINISHED, UNREADABLE, DUPLICATE, THINNED = (
@@ -118,7 +125,7 @@ def _read(store: Store, session: Session, content: str) -> dict[str, Any]:
         | {
             "probably_missing": seen.probable,
             "files": stored_seconds(store, seen.seconds, rig, content[:16]),
-            "alarm_rows": [_alarm_row(alarm) for alarm in summary.alarms],
+            "alarm_rows": [_alarm_row(alarm) for alarm in transitions(summary.alarms)],
             "loss_rows": _loss_rows(summary, seen.gaps),
         }
     )
@@ -143,7 +150,9 @@ def _figures(summary: Summary, rig: str) -> dict[str, Any]:
         "restarts": sum(max(0, device.boots - 1) for device in devices),
         "good": flags.get("good", 0) / judged if judged else None,
         "estimates": summary.topics.get("estimates", 0) > 0,
-        "raised": [alarm.name for alarm in summary.alarms if alarm.state == "unacknowledged"],
+        "raised": [
+            alarm.name for alarm in transitions(summary.alarms) if alarm.state == "unacknowledged"
+        ],
         "software": summary.run.software if summary.run else "",
         "configuration": summary.run.configuration_sha256 if summary.run else "",
         "notes": summary.run.notes if summary.run else "",

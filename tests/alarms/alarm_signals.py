@@ -44,12 +44,9 @@ def times(n: int, first: int = 0) -> np.ndarray:
 
 
 def _cut(one: Condition, first: int, last: int) -> Condition:
-    return Condition(
-        one.name,
-        one.active[first:last],
-        one.value[first:last],
-        one.low[first:last],
-        one.high[first:last],
+    part = slice(first, last)
+    return one._replace(
+        active=one.active[part], value=one.value[part], low=one.low[part], high=one.high[part]
     )
 
 

@@ -44,7 +44,8 @@ def write_session(
     if missing:
         writer.write(Gap("rig", boot, half, half + missing - 1, int(t_ns[half]), "daq", "line"))
     if alarm:
-        writer.write(_alarm(alarm, boot, int(t_ns[-1])))
+        writer.write(_alarm(alarm, boot, int(t_ns[-2]), 1.5))
+        writer.write(_alarm(alarm, boot, int(t_ns[-1]), 2.0))
     writer.flush()
     if close:
         writer.close()
@@ -60,7 +61,8 @@ def theta1(friction: float, count: int) -> np.ndarray:
     return values
 
 
-def _alarm(name: str, boot: int, t_ns: int) -> Alarm:
+def _alarm(name: str, boot: int, t_ns: int, value: float) -> Alarm:
+    """An alarm, or its value told again."""
     text = ("rubs", "stop")
-    limits = (2.0, 0.0, 1.0)
+    limits = (value, 0.0, 1.0)
     return Alarm(name, "unacknowledged", "error", *text, "rig", boot, 0, t_ns, *limits, True, "", 0)

@@ -46,7 +46,8 @@ def test_a_row_per_session(archive):
     assert (first["restarts"], first["good"], first["raised"]) == (1, 1.0, ["dry_friction"])
     assert first["start"] == datetime(2026, 1, 1)
     assert second["rig"] == "bench/2"
-    assert [row["name"] for row in _table(archive, "alarms").to_dicts()] == ["dry_friction"]
+    (alarm,) = _table(archive, "alarms").to_dicts()
+    assert (alarm["name"], alarm["value"]) == ("dry_friction", 2.0), "the force told last"
     (loss,) = _table(archive, "losses").to_dicts()
     assert (loss["what"], loss["count"], loss["reason"]) == ("samples", 5, "line")
 

@@ -24,10 +24,14 @@ def codes() -> np.ndarray:
     return code
 
 
-def found(signal: np.ndarray, cuts: tuple[int, ...] = ()) -> np.ndarray:
+def instants(signal: np.ndarray, cuts: tuple[int, ...] = ()) -> list[np.ndarray]:
     edges = JitteredEdges()
     parts = [edges.update(signal[a:b], codes()[a:b]) for a, b in pairwise((0, *cuts, N))]
-    return np.concatenate(parts)
+    return [np.concatenate(each) for each in zip(*parts, strict=True)]
+
+
+def found(signal: np.ndarray) -> np.ndarray:
+    return instants(signal)[0]
 
 
 def jittered(period: float, late: float = 0.5) -> np.ndarray:
@@ -72,10 +76,28 @@ def test_other_drives_have_no_late_edges(signal) -> None:
 def test_results_do_not_depend_on_blocks() -> None:
     signal = jittered(32.0)
 
-    np.testing.assert_array_equal(found(signal), found(signal, (1, 500, 501)))
+    for whole, cut in zip(instants(signal), instants(signal, (1, 500, 501)), strict=True):
+        np.testing.assert_array_equal(whole, cut)
 
 
 def test_the_instants_of_late_edges_are_unsure() -> None:
     steps = InputSteps(4).update(jittered(32.0), codes())
 
     np.testing.assert_array_equal(steps.unsure[SHOWN], 0.5)
+
+
+def test_the_motion_shows_the_instants_of_edges_that_jitter() -> None:
+    assert InputSteps(4).update(jittered(32.0), codes()).jitters[SHOWN].mean() > 0.7
+
+
+@pytest.mark.parametrize(
+    "signal",
+    [
+        square(1.0037 * AT, 32.0),
+        np.where(AT < 3000, square(AT, 32.0), square(AT - 1, 32.0)),
+        np.where(AT < 2900, jittered(32.0), 1.0),
+    ],
+    ids=["they slide", "one was late", "the wave has ended"],
+)
+def test_the_motion_shows_no_instants_of_other_edges(signal) -> None:
+    assert not InputSteps(4).update(signal, codes()).jitters[SHOWN].any()

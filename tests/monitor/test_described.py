@@ -1,5 +1,7 @@
 """Up to which frequency equations describe healthy recordings."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,7 +18,7 @@ def recording(role: str, pace: np.ndarray, share: np.ndarray) -> Left:
     judged = np.zeros((N, 6))
     judged[:, MEASURED] = np.random.default_rng(3).standard_normal(N)
     judged[:, E] = share * judged[:, MEASURED]
-    return Left(role, role, judged, pace)
+    return Left(role, role, judged, pace, 0.0)
 
 
 def sweep(worst: float, above: float = 12.0) -> Left:
@@ -67,6 +69,31 @@ def test_a_strong_drive_speaks_for_its_frequency_beside_a_weak_sweep() -> None:
     assert found.parts[1] == (0, N)
     # What is kept of the sweep ends before its held-out part, and is judged all the same.
     assert found.share == pytest.approx(0.19, rel=0.05)
+
+
+@pytest.mark.parametrize("noise", [0.25, 0.5])
+def test_noise_of_the_sensor_in_a_weak_sweep_refuses_no_rig(noise: float) -> None:
+    weak = replace(sweep(0.05), noise=noise)
+    weak.judged[:, E] += noise * np.random.default_rng(4).standard_normal(N)
+
+    found = described([weak, replace(tone(8.0), noise=noise)], "rig", RATE)
+
+    assert found.parts == ((0, N), (0, N))
+    assert found.share < 0.12
+
+
+def test_a_sensor_that_shows_only_noise_refuses_a_rig() -> None:
+    one = replace(tone(8.0, 0.99), noise=1.0)
+
+    with pytest.raises(ModelError, match="leave 99 %"):
+        described([one], "rig", RATE)
+
+
+def test_noise_hides_no_fast_motion_that_is_not_described() -> None:
+    one = replace(sweep(0.4), noise=0.25)
+    one.judged[:, E] += 0.25 * np.random.default_rng(4).standard_normal(N)
+
+    assert 12.0 < described([one, replace(tone(8.0), noise=0.25)], "rig", RATE).fastest < 14.0
 
 
 def test_a_sweep_that_is_not_described_anywhere_refuses_a_rig() -> None:

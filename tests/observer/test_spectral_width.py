@@ -174,6 +174,38 @@ def test_a_motion_of_another_size_under_the_recorded_drive_deviates(size, volts,
     assert np.all((found[SETTLED:] > 1.0) == deviates)
 
 
+DRIFT = np.linspace(0.75, 0.95, 3072)
+BANDS_OF_8_HZ = (0.0, 0.1, 0.3, 0.1, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("drift", "volts", "expected"),
+    [(DRIFT, 1.0, KNOWN), (DRIFT[::-1], 1.0, KNOWN), (DRIFT, 1.5, np.inf)],
+    ids=["same", "otherwise", "another drive"],
+)
+def test_a_motion_that_drifts_is_known_by_its_drive(drift, volts, expected) -> None:
+    seen = spectrum(8.0)
+    recorded = Spectrum(DRIFT[512:], 8.5 * DRIFT[512:], seen.size[512:])
+    bands = BANDS_OF_8_HZ
+    motion = steady_motion(recorded, driven(recorded), Extremes(KNOWN), RATE, bands)
+    assert motion is not None
+    known = structs.replace(
+        limits(), steady_narrow=(motion.narrow,), steady_motion_bands=motion.bands
+    )
+
+    energies = volts**2 * np.tile(bands, (seen.pace.size, 1))
+    now = seen._replace(narrow=drift, pace=8.5 * drift)
+    found = UsualError(known, RATE).update(now, driven(now), energies).extremes[0]
+
+    assert np.all(found[SETTLED:] == expected)
+
+
+def test_a_motion_that_drifts_under_a_drive_that_is_not_steady_is_none() -> None:
+    seen = spectrum(8.0)._replace(narrow=DRIFT)
+
+    assert steady_motion(seen, driven(seen), Extremes(KNOWN), RATE) is None
+
+
 def test_a_size_may_differ_by_more_where_the_drive_is_faster() -> None:
     seen = spectrum(8.0, 0.175)
     bands = np.tile([0.0, 0.1, 0.3, 0.1, 0.0, 0.0, 0.0], (seen.pace.size, 1))

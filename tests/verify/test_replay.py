@@ -10,6 +10,7 @@ import pytest
 from monitor.model import load_model
 from monitor.pipeline import RigMonitor
 from rigwatch.commands import main
+from rigwatch.commands.sessions.replay import Announcer
 from rigwatch.replay.run import judge
 from rigwatch.replay.source import items
 from rigwatch.wire.bus import command_mark
@@ -33,6 +34,21 @@ def test_alarms_and_summary(capsys: pytest.CaptureFixture[str]) -> None:
     assert any("dry_friction: unacknowledged" in line for line in lines)
     assert "2048 samples, 8.0 s in" in lines[-1]
     assert "dry_friction" in lines[-1]
+
+
+def test_a_value_told_again_is_printed_with_it(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["replay", FRICTION, *MODEL, "--json"])
+    told = json.loads(capsys.readouterr().out)["alarms"]
+    alarm = next(Alarm(**one) for one in told if one["name"] == "dry_friction")
+
+    announce = Announcer()
+    announce(alarm)
+    announce(replace(alarm, seq=alarm.seq + 64, value=0.47))
+
+    first, again = capsys.readouterr().out.splitlines()
+    assert "dry_friction: unacknowledged" in first
+    assert ", now " not in first
+    assert ", now 0.47 (" in again
 
 
 def test_a_recording_too_short_to_arm_says_that_nothing_was_judged(

@@ -6,7 +6,8 @@ below that frequency; faster motion is as unknown as motion of a size that was n
 
 Every recording tells how well its frequencies are described, by its power: what does not grow with
 the motion, as hysteresis of a valve, is a large part of a weak sweep and little of a strong drive
-at the same frequency.
+at the same frequency. The sensor's own noise tells nothing of the equations, although it may be
+half of what a weak sweep shows: its energy does not count, unless hardly anything else is measured.
 """
 
 from collections.abc import Sequence
@@ -22,6 +23,8 @@ WORST = 0.2
 """Relative residual on held-out healthy data above which the equations are refused."""
 DESCRIBED = 0.1
 """Relative residual of a band of frequencies up to which they describe it."""
+SHOWS = 2.0
+"""Energy of what is measured, relative to its sensor's noise, from which on it shows the motion."""
 BAND = 1.2
 """Ratio of a band's ends."""
 WINDOW = 1.0
@@ -40,17 +43,29 @@ class Left:
         name, role: of the recording.
         judged: its judged columns, see `missing_force`, shape (n, columns).
         pace: mean frequency of its motion, shape (n,) [Hz].
+        noise: of the sensor whose output is predicted, rms.
     """
 
     name: str
     role: str
     judged: FloatArray
     pace: FloatArray
+    noise: float
 
     def share(self, begin: int, end: int) -> float:
-        """Residual relative to what is measured; 0 of nothing."""
+        """Residual relative to what is measured, both beyond the noise; 0 of nothing."""
         part = self.judged[begin:end]
-        return rms(part[:, E]) / max(rms(part[:, MEASURED]), 1e-12) if len(part) else 0.0
+        if not len(part):
+            return 0.0
+        left, shown = self.beyond_noise(*np.mean(part[:, [E, MEASURED]] ** 2, axis=0).tolist())
+        return float(np.sqrt(left / max(shown, 1e-24)))
+
+    def beyond_noise(self, left: float, shown: float) -> tuple[float, float]:
+        """Mean squares of the residual and of what is measured, without the noise in both."""
+        noise = self.noise**2
+        if shown < SHOWS * noise:
+            return left, shown
+        return max(left - noise, 0.0), shown - noise
 
     @property
     def held_out(self) -> int:
@@ -119,10 +134,11 @@ def _fastest(recordings: Sequence[Left], rate: float) -> float:
     windows = _windows(recordings, rate)
     for top in np.sort(np.concatenate([one[0] for one in windows]))[::-1]:
         error = size = 0.0
-        for paces, errors, sizes in windows:
+        for one, (paces, errors, sizes) in zip(recordings, windows, strict=True):
             band = (paces <= top) & (paces >= top / BAND)
             if band.any():
-                error, size = error + errors[band].mean(), size + sizes[band].mean()
+                left, shown = one.beyond_noise(errors[band].mean(), sizes[band].mean())
+                error, size = error + left, size + shown
         if error <= DESCRIBED**2 * size:
             return float(top)
     return 0.0

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from monitor.drives import BANDS, steady_energies
+from monitor.drives import steady_energies
 from monitor.model import HealthyLimits
 from monitor.observer import (
     DEVIATIONS,
@@ -96,12 +96,12 @@ def healthy_limits(
         noise, growth, 1.0, np.inf, 1.0, 1.0, 0.0, 1.0, speed_noise, NEVER, 1, 1.0
     )  # fmt: skip
     largest = [_extremes(part, rules, skip) for part in parts]
+    drives = [steady_energies(part.bands) for part in parts]
     motions = [
-        (steady_motion(p.motion, p.pace, own, rate), steady_energies(p.bands))
-        for p, own in zip(parts, largest, strict=True)
+        steady_motion(p.motion, p.pace, own, rate, drive)
+        for p, own, drive in zip(parts, largest, drives, strict=True)
     ]
-    steady = [motion for motion, _ in motions if motion is not None]
-    bands = [own or (0.0,) * BANDS for motion, own in motions if motion is not None]
+    steady = [motion for motion in motions if motion is not None]
     return HealthyLimits(
         noise=noise, growth=tuple(growth.tolist()),
         short=max(own.short for own in largest), medium=max(own.medium for own in largest),
@@ -112,8 +112,8 @@ def healthy_limits(
         steady_sizes=tuple(motion.size for motion in steady),
         steady_narrow=tuple(motion.narrow for motion in steady),
         steady_drives=tuple(motion.drive for motion in steady),
-        steady_drive_energies=tuple(e for _, own in motions for e in own),
-        steady_motion_bands=tuple(e for own in bands for e in own),
+        steady_drive_energies=tuple(e for drive in drives for e in drive),
+        steady_motion_bands=tuple(e for motion in steady for e in motion.bands),
         steady_energies=tuple(motion.extremes.lasting for motion in steady),
         steady_shorts=tuple(motion.extremes.short for motion in steady),
         steady_mediums=tuple(motion.extremes.medium for motion in steady),

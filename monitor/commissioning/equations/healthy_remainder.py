@@ -6,7 +6,7 @@ import numpy as np
 
 from monitor.commissioning.equations.described import TRAINED, Left, described, rms
 from monitor.commissioning.equations.fitted_equations import admitted
-from monitor.commissioning.unhealthy import check_healthy
+from monitor.commissioning.unhealthy import check_healthy, white_noise
 from monitor.model import (
     EquationsPlant,
     RemainderSection,
@@ -58,8 +58,9 @@ def healthy_remainder(
     ]
     check_healthy([name for name, _ in steady], [judged for _, judged in steady], rate)
     slow = slow_speed(later, layout, plant)
+    noise = min(white_noise(one.channel(layout.channels[-1])) for one in used)
     left = [
-        Left(one.name, one.role, o.judged, spectrum_of(o, layout, slow, rate).pace)
+        Left(one.name, one.role, o.judged, spectrum_of(o, layout, slow, rate).pace, noise)
         for one, o in zip(used, later, strict=True)
     ]
     del later

@@ -77,7 +77,7 @@ def judged(
     session = open_session(path)
     monitor = monitor_for(session, model, config)
     found = _as_data(replay(session, monitor, span_between(start, end, session)), None)
-    raised = [alarm.name for alarm in found["alarms"] if alarm.state == "unacknowledged"]
+    raised = _raised(found["alarms"])
     kept = ("samples", "armed", "duration_s", "alarms", "events", "lost")
     return {"raised": raised, "raised_count": len(raised)} | {name: found[name] for name in kept}
 
@@ -95,7 +95,7 @@ def _run_one(arguments: argparse.Namespace, path: Path) -> int:
     session = open_session(path)
     monitor = monitor_for(session, arguments.model, arguments.config)
     span = span_of(arguments, session)
-    announce = _ignore if arguments.json else _announce
+    announce = _ignore if arguments.json else Announcer()
     done = replay(session, monitor, span, speed=arguments.speed, out=arguments.out, say=announce)
     for line in damage_lines(done.lost):
         say(line)
@@ -107,18 +107,34 @@ def _ignore(_: "Alarm") -> None:
     """Print nothing: with --json all results come at the end."""
 
 
-def _announce(alarm: "Alarm") -> None:
-    """Print an alarm as it occurs."""
-    from rigwatch.wire.session import iso_time
+class Announcer:
+    """Prints an alarm as it occurs, and its value if it is told again."""
 
-    first = ", first" if alarm.first_out else ""
-    state = alarm.state.replace("_", " ")
-    head = f"{iso_time(alarm.t_ns)}  {alarm.severity:8}  {alarm.name}: {state}{first}"
-    print(f"{head} ({alarm.cause})", flush=True)
+    def __init__(self) -> None:
+        self._newest: dict[str, Alarm] = {}
+
+    def __call__(self, alarm: "Alarm") -> None:
+        """Print a line."""
+        from rigwatch.wire.messages import told_again
+        from rigwatch.wire.session import iso_time
+
+        before = self._newest.get(alarm.name)
+        self._newest[alarm.name] = alarm
+        first = ", first" if alarm.first_out else ""
+        again = f", now {alarm.value:.3g}" if before and told_again(before, alarm) else ""
+        state = alarm.state.replace("_", " ")
+        head = f"{iso_time(alarm.t_ns)}  {alarm.severity:8}  {alarm.name}: {state}{first}{again}"
+        print(f"{head} ({alarm.cause})", flush=True)
+
+
+def _raised(alarms: "list[Alarm]") -> list[str]:
+    from rigwatch.wire.messages import transitions
+
+    return [alarm.name for alarm in transitions(alarms) if alarm.state == "unacknowledged"]
 
 
 def _summary(done: "Replay") -> str:
-    raised = [alarm.name for alarm in done.alarms if alarm.state == "unacknowledged"]
+    raised = _raised(done.alarms)
     speed = f"{done.elapsed_s:.2f} s ({done.times_real_time:,.0f} × real time)"
     return (
         f"{done.samples} samples, {done.duration_s:.1f} s in {speed}; {_alarms(raised, done.armed)}"

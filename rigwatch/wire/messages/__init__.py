@@ -48,7 +48,7 @@ from rigwatch.wire.messages.message_types import (
     SampleBlock,
     Severity,
 )
-from rigwatch.wire.messages.newest_alarms import MOST_ALARMS, remember
+from rigwatch.wire.messages.newest_alarms import MOST_ALARMS, remember, told_again, transitions
 from rigwatch.wire.messages.packed import UNFAMILIAR, decode_block, layout_of
 from rigwatch.wire.messages.quality_flags import (
     NON_FINITE,
@@ -150,8 +150,10 @@ __all__ = [
     "protobuf_schema",
     "quality_flags",
     "remember",
+    "told_again",
     "topic",
     "topic_of",
+    "transitions",
     "unseen",
     "valid",
 ]

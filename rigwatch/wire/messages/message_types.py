@@ -229,7 +229,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """One transition of one alarm.
+    """One transition of one alarm, or its better value in the same state (`transitions`).
 
     Attributes:
         name: the alarm, such as "dry_friction" or "link".

@@ -1,5 +1,8 @@
 """The newest change of each alarm, in bounded memory: a name costs a stranger nothing."""
 
+from collections.abc import Iterable
+from dataclasses import replace
+
 from rigwatch.wire.messages.message_types import Alarm
 
 MOST_ALARMS = 2048
@@ -16,3 +19,32 @@ def remember(alarms: dict[str, Alarm], alarm: Alarm) -> None:
     if len(alarms) > MOST_ALARMS:
         over = (name for name, one in alarms.items() if one.state == "normal")
         del alarms[next(over, next(iter(alarms)))]
+
+
+def transitions(alarms: Iterable[Alarm]) -> list[Alarm]:
+    """The changes of state, each with the value and the cause that were told last in it.
+
+    A standing alarm is told again where its value has become better, and by a monitor that was
+    restarted.
+
+    Args:
+        alarms: as they were told, in order.
+    """
+    found: list[Alarm] = []
+    places: dict[str, int] = {}
+    for alarm in alarms:
+        place = places.get(alarm.name)
+        if place is not None and told_again(found[place], alarm):
+            found[place] = replace(
+                found[place], value=alarm.value, low=alarm.low, high=alarm.high, cause=alarm.cause
+            )
+            continue
+        places[alarm.name] = len(found)
+        found.append(alarm)
+    return found
+
+
+def told_again(before: Alarm, now: Alarm) -> bool:
+    """Whether an alarm stands as it did, since the same sample."""
+    own = (now.device, now.boot, now.onset_seq, now.state, now.user)
+    return own == (before.device, before.boot, before.onset_seq, before.state, before.user)
