@@ -301,7 +301,7 @@ def _set_verdict(
     return replace(
         found,
         best=row,
-        text=f"with {_rest(bench, others, first)}: {found.text}{_how_to_add(row, others)}",
+        text=f"beside {_rest(bench, others, first)}, {found.text}{_how_to_add(row, others)}",
         second=second,
         evidence=Evidence(left, found.evidence.margin),
         beside=others,
@@ -315,11 +315,13 @@ def _named_alone(part: _Member, alone: Mapping[str, Ranked]) -> Ranked:
 
 
 def _rest(bench: Bench, others: Sequence[str], part: _Member) -> str:
-    """The rest of a set, and from where to where it alone brings the held-out error."""
+    """The rest of a set, and from where to where it brings the held-out error without the named."""
     if part.without is None:
         return _joined(others)
-    before, alone = bench.base.told_error, part.without.told_error
-    return f"{_joined(others)} ({before:.3g} → {alone:.3g} {bench.base.told_in})"
+    before, left = bench.base.told_error, part.without.told_error
+    errors = f"the held-out error from {before:.3g} to {left:.3g} {bench.base.told_in}"
+    alone = "which by itself takes" if len(others) == 1 else "which by themselves take"
+    return f"{_joined(others)}, {alone} {errors}"
 
 
 def _how_to_add(row: Ranked, others: Sequence[str]) -> str:
