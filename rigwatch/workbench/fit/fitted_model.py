@@ -102,9 +102,12 @@ def fit_base(
     except ModelError:
         if not placements:
             raise
-    found = fit_model(study, data, (), start, scale, multi_start=True)
+    own = {name: value for name, value in start.items() if name in study.model.parameters}
+    found = fit_model(study, data, (), own, scale, multi_start=True)
     for count in range(1, len(placements) + 1):
-        begin = start | found.train.values()
+        waiting = tuple(placement.prefix for placement in placements[count:])
+        begin = {name: value for name, value in start.items() if not name.startswith(waiting)}
+        begin |= found.train.values()
         found = fit_with_retry(study, data, placements[:count], begin, scale, multi_start=True)
     return found
 
