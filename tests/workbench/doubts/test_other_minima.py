@@ -1,5 +1,6 @@
 """A fit that ended in a local minimum is begun again, before what it leaves is called an effect."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,8 +9,16 @@ import pytest
 
 from rigwatch.workbench.compare.preparation import Bench, open_bench, with_base
 from rigwatch.workbench.explain.explain import explained
-from rigwatch.workbench.fit import another_start, begun_from_given, begun_from_larger, fit_model
-from rigwatch.workbench.ranking import rank
+from rigwatch.workbench.explain.sets.combination import Combination
+from rigwatch.workbench.explain.sets.several_effects import _judge_each
+from rigwatch.workbench.fit import (
+    Fitted,
+    another_start,
+    begun_from_given,
+    begun_from_larger,
+    fit_model,
+)
+from rigwatch.workbench.ranking import Ranked, no_progress, rank, rank_all
 from rigwatch.workbench.steps.trial import _tried
 from rigwatch.workbench.study.study import open_study
 from tests.workbench.fits.test_accepted_fit import UNITS, WAVES, waves
@@ -40,10 +49,15 @@ def bench_of_waves(folder: Path, constant: float) -> Bench:
 
 def astray(bench: Bench, wave_number: float) -> Bench:
     """The model alone in the local minimum near a wave number [rad/m]."""
-    start = {"a": 1.0, "w": wave_number}
-    found = fit_model(bench.study, bench.data, (), start, bench.base.train.scale)
+    found = fitted_with(bench, (), {"a": 1.0, "w": wave_number})
     assert found.train_error > 1.9
     return with_base(bench, found)
+
+
+def fitted_with(bench: Bench, rows: Sequence[Ranked], start: dict[str, float]) -> Fitted:
+    """The model with effects, fitted from values of its own parameters."""
+    placements = [row.placement for row in rows]
+    return fit_model(bench.study, bench.data, placements, start, bench.base.train.scale)
 
 
 @pytest.mark.parametrize("wave_number", [4.0, 5.0, 9.0])
@@ -87,6 +101,22 @@ def test_an_accepted_fit_is_begun_again_if_it_leaves_more_than_noise(
     assert len(begun) == (0 if right else 1)
     assert bench.base.convergence is not None
     assert bench.base.convergence.begun == ("the accepted fit" if right else "the given values")
+
+
+def test_an_effect_that_only_led_another_out_of_its_minimum_is_not_judged_beside_it(
+    tmp_path: Path,
+) -> None:
+    bench = bench_of_waves(tmp_path, 4.0)
+    rows = {row.label: row for row in rank_all(bench.study, bench.data, bench.base)}
+    constant, spring = rows["constant_force@load"], rows["linear_stiffness@load"]
+    constant.fitted = fitted_with(bench, (constant,), {"a": 1.0, "w": 5.0})
+    spring.fitted = fitted_with(bench, (constant, spring), {"a": 3.0, "w": 2.0})
+    assert constant.fitted.held_out_error > 1.8
+    better, judged = _judge_each(bench, Combination((constant, spring)), no_progress)
+    assert better is not None
+    assert better.labels == {"constant_force@load"}
+    assert better.fitted.held_out_error < 1.1 * NOISE
+    assert not judged
 
 
 def test_the_fit_stays_where_another_start_leads_to_no_better_one(tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ from rigwatch.workbench.explain.sets.combination import (
 )
 from rigwatch.workbench.explain.sets.combinations import (
     UNLIMITED,
+    at_its_best,
     combinations,
     simplest_of_best,
     without,
@@ -222,7 +223,9 @@ def _judge_each(
 ) -> tuple[Combination | None, list[_Member]]:
     """A better set if leaving out or replacing an effect gives one, and the verdict on each."""
     each_left_out = [(row, without(bench, best, row)) for row in best.rows]
-    rests = [(row, rest) for row, rest in each_left_out if rest is not None]
+    rests = [
+        (row, at_its_best(bench, rest, best)) for row, rest in each_left_out if rest is not None
+    ]
     as_good = [rest for _, rest in rests if not_worse(rest, best)]
     if as_good:
         # A needless effect takes part of another's, and hides what that cannot be told from.
