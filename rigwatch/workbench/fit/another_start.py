@@ -6,6 +6,8 @@ the effect in the model a fit that goes on from there may stop in another minimu
 leaves looks like a further effect. Two models are compared only where each is at its best.
 """
 
+from collections.abc import Mapping
+
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, NoiseFloor
 from rigwatch.workbench.fit.fitted import Fitted
@@ -30,24 +32,16 @@ def only_noise_left(floor: NoiseFloor, found: Fitted) -> bool:
 
 
 def begun_from_given(study: Study, data: Data, found: Fitted) -> Fitted:
-    """The better of a fit and a search from the given values of the model's parameters.
+    """The better of a fit and one from the given values of the model's parameters.
 
     Its effects begin where they were found.
 
     Args:
         study, data, found: the study, its recordings, and a fit of its model with effects.
     """
-    if not has_other_starts(study, data):
-        return found
     own, given = study.model.parameters, study.file.start
     start = found.train.values() | {name: given.get(name, p.value) for name, p in own.items()}
-    try:
-        again = fit_model(
-            study, data, found.placements, start, found.train.scale, multi_start=True
-        )  # fmt: skip
-    except ModelError:
-        return found
-    return _better(found, again)
+    return _better(study, data, found, start, "the given values")
 
 
 def begun_from_larger(study: Study, data: Data, found: Fitted, larger: Fitted) -> Fitted:
@@ -59,26 +53,25 @@ def begun_from_larger(study: Study, data: Data, found: Fitted, larger: Fitted) -
         study, data, found: as in `begun_from_given`.
         larger: a fit of the same model with the further effect.
     """
-    if not has_other_starts(study, data):
+    values = larger.train.values()
+    start = {name: values[name] for name in found.train.values()}
+    return _better(study, data, found, start, "a fit with a further effect")
+
+
+def _better(
+    study: Study, data: Data, found: Fitted, start: Mapping[str, float], begun: str
+) -> Fitted:
+    """A fit from another start if it leaves materially less of the training and no more held out.
+
+    Along the motion fits have many starts already, and those of a rough model follow its reference.
+    """
+    if data.along_motion or study.model.rough:
         return found
-    start, names = larger.train.values(), found.train.values()
     try:
-        again = fit_model(
-            study, data, found.placements, {name: start[name] for name in names},
-            found.train.scale, base=found,
-        )  # fmt: skip
+        again = fit_model(study, data, found.placements, start, found.train.scale)
     except ModelError:
         return found
-    label = f"{larger.placements[-1].name}@{larger.placements[-1].port}"
-    return _better(found, with_convergence(again, data, f"the fit with {label}"))
-
-
-def has_other_starts(study: Study, data: Data) -> bool:
-    """Whether a study's fits may be begun elsewhere; along the motion they are searched for."""
-    return not (data.along_motion or study.model.rough)
-
-
-def _better(found: Fitted, again: Fitted) -> Fitted:
-    """The second fit if it leaves materially less of the training and no more held out."""
     lower = again.train_error <= LOWER * found.train_error
-    return again if lower and again.held_out_error <= found.held_out_error else found
+    if not lower or again.held_out_error > found.held_out_error:
+        return found
+    return with_convergence(again, data, begun)
