@@ -82,7 +82,8 @@ def rank(
     while similar := _unfitted_similar(rows, floor):
         progress(f"fitting {similar.label}, which resembles the best")
         refit(study, data, base, similar, fit_model if enough else fit_with_retry)
-    _begin_again(study, data, base, rows, floor, progress)
+    if free_run:
+        _begin_again(study, data, base, rows, floor, progress)
     for other in _elsewhere(study, data, rows, floor):
         progress(f"fitting {other.label}, as the best may act there")
         refit(study, data, base, other, fit_from(in_order(rows)[0].fitted))
