@@ -16,6 +16,7 @@ from rigwatch.workbench.compare.preparation import (
     determined_by_healthy,
     open_bench,
     prepared,
+    with_base,
 )
 from rigwatch.workbench.compare.uncertainty_budget import added_variances, apparent_strength
 from rigwatch.workbench.compare.unweighed import unweighed
@@ -43,6 +44,7 @@ __all__ = [
     "prepared",
     "sample_numbers",
     "unweighed",
+    "with_base",
     "with_hold_decided",
     "with_horizon_of",
 ]

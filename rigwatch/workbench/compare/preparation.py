@@ -23,9 +23,12 @@ from rigwatch.workbench.data import (
 )
 from rigwatch.workbench.fit import (
     Fitted,
+    begun_from_given,
     fit_base,
     fit_model,
+    keeps_accepted,
     learns_from_healthy,
+    only_noise_left,
     poorly_determined,
     with_healthy_parameters,
     with_healthy_reference,
@@ -110,9 +113,25 @@ def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench
     base = fit_base(study, data, scale)
     healthy = data.of_healthy
     if healthy is None:
-        return Bench(study, data, base, held_out_floor(study, data, base.held_out), None)
-    bare = fit_model(study, healthy, (), study.file.start, base.train.scale, multi_start=True)
-    return Bench(study, data, base, _of_healthy(study, data, healthy, base, bare), bare)
+        floor, bare = held_out_floor(study, data, base.held_out), None
+    else:
+        bare = fit_model(study, healthy, (), study.file.start, base.train.scale, multi_start=True)
+        floor = _of_healthy(study, data, healthy, base, bare)
+    bench = Bench(study, data, base, floor, bare)
+    # An accepted fit was begun where the model without its effect had ended.
+    if keeps_accepted(study) and not only_noise_left(floor, base):
+        return with_base(bench, begun_from_given(study, data, base))
+    return bench
+
+
+def with_base(bench: Bench, base: Fitted) -> Bench:
+    """The bench with another fit of its model, and the noise floor that follows from it."""
+    if base is bench.base:
+        return bench
+    floor = bench.floor
+    if bench.data.of_healthy is None:
+        floor = held_out_floor(bench.study, bench.data, base.held_out)
+    return replace(bench, base=base, floor=floor)
 
 
 def _of_healthy(study: Study, data: Data, healthy: Data, base: Fitted, bare: Fitted) -> NoiseFloor:

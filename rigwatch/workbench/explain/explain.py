@@ -8,6 +8,7 @@ from rigwatch.workbench.compare import (
     Bench,
     Decided,
     open_bench,
+    with_base,
     with_hold_decided,
 )
 from rigwatch.workbench.data import predicts_along_motion
@@ -41,10 +42,12 @@ from rigwatch.workbench.explain.rough_verdict import (
 from rigwatch.workbench.explain.sets.pairs import two_effects
 from rigwatch.workbench.explain.sets.several_effects import may_need_several, several_effects
 from rigwatch.workbench.explain.verdict import Verdict, not_converged
+from rigwatch.workbench.fit import begun_from_larger
 from rigwatch.workbench.ranking import (
     MATERIAL,
     Progress,
     Ranked,
+    in_order,
     no_progress,
     own_floor,
     rank,
@@ -245,11 +248,31 @@ def _ranked(
     if stopped is not None:
         rows = rank_all(bench.study, bench.data, bench.base)
         return bench, rows, with_base_offered(bench, stopped)
-    rows = rows or rank(bench.study, bench.data, bench.base, bench.floor, progress)
+    bench, rows = _beside_best_base(bench, progress, rows)
     decided = with_hold_decided(bench, rows, progress)
     bench, rows = decided.bench, decided.rows
     found, verdict = _judged(with_lower_floor(bench, rows), rows, progress)
     return bench, found, _with_rival_hold(decided, verdict)
+
+
+def _beside_best_base(
+    bench: Bench, progress: Progress, rows: list[Ranked] | None
+) -> tuple[Bench, list[Ranked]]:
+    """The study with its model's best fit, and the ranking beside it; `rows` if it is ranked.
+
+    An effect may only have led the fit out of a local minimum: then the model, begun where the fit
+    with the effect ended, leaves as little without it.
+    """
+    rows = rows or rank(bench.study, bench.data, bench.base, bench.floor, progress)
+    base, larger = bench.base, [row.fitted for row in in_order(rows) if row.fitted is not None]
+    if larger and not bench.floor.reached(base.held_out):
+        least = min(larger, key=lambda fitted: fitted.train_error)
+        for fitted in dict.fromkeys((larger[0], least)):
+            base = begun_from_larger(bench.study, bench.data, base, fitted)
+    if base is bench.base:
+        return bench, rows
+    progress("the current model leaves less from other values: ranking the effects again")
+    return _beside_best_base(with_base(bench, base), progress, None)
 
 
 def _judged(bench: Bench, rows: list[Ranked], progress: Progress) -> tuple[list[Ranked], Verdict]:

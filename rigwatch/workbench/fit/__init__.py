@@ -1,5 +1,10 @@
 """Fits a study's model to its recordings: intervals, healthy parameters, holds, free run."""
 
+from rigwatch.workbench.fit.another_start import (
+    begun_from_given,
+    begun_from_larger,
+    only_noise_left,
+)
 from rigwatch.workbench.fit.continued_error import continued_train_error
 from rigwatch.workbench.fit.fitted import Fitted, block_differences, error_text
 from rigwatch.workbench.fit.fitted_model import (
@@ -7,6 +12,7 @@ from rigwatch.workbench.fit.fitted_model import (
     fit_base,
     fit_model,
     fit_with_retry,
+    keeps_accepted,
     may_be_local_minimum,
     nodes,
     placements_of,
@@ -47,6 +53,8 @@ __all__ = [
     "Fitted",
     "Value",
     "as_written",
+    "begun_from_given",
+    "begun_from_larger",
     "block_differences",
     "block_numbers",
     "continued_train_error",
@@ -60,10 +68,12 @@ __all__ = [
     "free_run",
     "held_as",
     "interval_with_held",
+    "keeps_accepted",
     "learns_from_healthy",
     "may_be_local_minimum",
     "may_hide_slow",
     "nodes",
+    "only_noise_left",
     "placements_of",
     "poorly_determined",
     "profile",

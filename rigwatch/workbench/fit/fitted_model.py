@@ -95,25 +95,34 @@ def fit_base(
     """
     placements, start = placements_of(study, data.train), parameters_of(study.file)
     try:
-        if not multi_start and study.file.effects and study.file.effects[-1].model:
-            return _kept(fit_model(study, data, placements, start, scale), data)
+        if not multi_start and keeps_accepted(study):
+            found = fit_model(study, data, placements, start, scale)
+            return with_convergence(found, data, "the accepted fit")
         return fit_with_retry(study, data, placements, start, scale, multi_start=True)
     except ModelError:
         if not placements:
             raise
-    found = fit_model(study, data, (), start, scale, multi_start=True)
+    own = {name: value for name, value in start.items() if name in study.model.parameters}
+    found = fit_model(study, data, (), own, scale, multi_start=True)
     for count in range(1, len(placements) + 1):
-        begin = start | found.train.values()
+        waiting = tuple(placement.prefix for placement in placements[count:])
+        begin = {name: value for name, value in start.items() if not name.startswith(waiting)}
+        begin |= found.train.values()
         found = fit_with_retry(study, data, placements[:count], begin, scale, multi_start=True)
     return found
 
 
-def _kept(found: Fitted, data: Data) -> Fitted:
-    """A fit started from the accepted one, with its convergence."""
+def keeps_accepted(study: Study) -> bool:
+    """Whether a study has the fit with which its last effect was accepted."""
+    return bool(study.file.effects and study.file.effects[-1].model)
+
+
+def with_convergence(found: Fitted, data: Data, begun: str) -> Fitted:
+    """A fit from a single start with its convergence; `begun` is that start, in words."""
     gradient = None
     if not data.along_motion:
         gradient = kept_promise(found.train, data.train, found.horizon, found.substeps)
-    ended = convergence(found.train, [], "the accepted fit", near_noise=False, gradient=gradient)
+    ended = convergence(found.train, [], begun, near_noise=False, gradient=gradient)
     return replace(found, convergence=ended)
 
 

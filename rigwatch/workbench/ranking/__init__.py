@@ -38,9 +38,11 @@ from rigwatch.workbench.ranking.refitting import (
     Fitting,
     Progress,
     fit_started,
+    leaves_only_noise,
     no_progress,
     own_floor,
     refit,
+    refit_from_given,
 )
 from rigwatch.workbench.ranking.same_drive import denied_sensors
 from rigwatch.workbench.ranking.scoring import rank_all, rank_only, score_all, scored
@@ -67,6 +69,7 @@ __all__ = [
     "fit_started",
     "in_order",
     "judge_fit",
+    "leaves_only_noise",
     "left_over",
     "neutral_strength",
     "no_progress",
@@ -79,6 +82,7 @@ __all__ = [
     "rank_only",
     "refinements",
     "refit",
+    "refit_from_given",
     "refit_nested",
     "same_family",
     "score_all",

@@ -19,10 +19,12 @@ from rigwatch.workbench.ranking.refitting import (
     Progress,
     fit_each,
     fit_from,
+    leaves_only_noise,
     no_progress,
     own_floor,
     refit,
     refit_elsewhere,
+    refit_from_given,
 )
 from rigwatch.workbench.ranking.same_drive import denied_sensors
 from rigwatch.workbench.ranking.scoring import scored
@@ -36,7 +38,8 @@ MUCH_WORSE = 1.5
 
 Up to it another effect may be the right one, is fitted and may be named in place of the best.
 """
-
+BEGUN_AGAIN = 3
+"""Most rows that are begun once more from the given values."""
 MOST_MORE = 6
 """Most rows that are fitted although others explain more, to first order."""
 
@@ -79,6 +82,8 @@ def rank(
     while similar := _unfitted_similar(rows, floor):
         progress(f"fitting {similar.label}, which resembles the best")
         refit(study, data, base, similar, fit_model if enough else fit_with_retry)
+    if free_run:
+        _begin_again(study, data, base, rows, floor, progress)
     for other in _elsewhere(study, data, rows, floor):
         progress(f"fitting {other.label}, as the best may act there")
         refit(study, data, base, other, fit_from(in_order(rows)[0].fitted))
@@ -86,6 +91,29 @@ def rank(
         progress(f"fitting {other.label}, as the best at its port leaves more than noise")
         refit(study, data, base, other, fit_model)
     return in_order(rows)
+
+
+def _begin_again(  # noqa: PLR0917 -- they belong together
+    study: Study,
+    data: Data,
+    base: Fitted,
+    rows: Sequence[Ranked],
+    floor: NoiseFloor,
+    progress: Progress,
+) -> None:
+    """Begin the best rows once more from the given values, until one leaves only noise.
+
+    All have begun where the base model ended.
+    """
+    tried = set[str]()
+    for _ in range(BEGUN_AGAIN):
+        fitted = [row for row in in_order(rows) if row.fitted is not None]
+        waiting = [row for row in fitted if row.label not in tried]
+        if not waiting or leaves_only_noise(study, data, floor, fitted[0]):
+            return
+        progress(f"fitting {waiting[0].label} again, starting from the given values")
+        tried.add(waiting[0].label)
+        refit_from_given(study, data, base, waiting[0])
 
 
 def _fit_skipped(  # noqa: PLR0917 -- they belong together

@@ -11,9 +11,11 @@ from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, NoiseFloor, lowered
 from rigwatch.workbench.fit import (
     Fitted,
+    begun_from_given,
     fit_model,
     fit_with_retry,
     may_be_local_minimum,
+    only_noise_left,
     refit_from_short_horizons,
 )
 from rigwatch.workbench.ranking.acceptance import EXPLAINED, judge_fit, leaves_nothing
@@ -174,3 +176,18 @@ def refit_elsewhere(
     for (row, _), found in zip(doubtful, better, strict=True):
         row.fitted = found
         judge_fit(base, row)
+
+
+def refit_from_given(study: Study, data: Data, base: Fitted, row: Ranked) -> None:
+    """Begin a fitted row once more from the model's given values; the better fit is kept."""
+    assert row.fitted is not None
+    again = begun_from_given(study, data, row.fitted)
+    if again is not row.fitted:
+        row.fitted = again
+        judge_fit(base, row)
+
+
+def leaves_only_noise(study: Study, data: Data, floor: NoiseFloor, row: Ranked) -> bool:
+    """Whether a fitted row leaves only noise, by its own floor."""
+    assert row.fitted is not None
+    return only_noise_left(own_floor(study, data, floor, row), row.fitted)

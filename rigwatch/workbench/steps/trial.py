@@ -23,9 +23,11 @@ from rigwatch.workbench.ranking import (
     Progress,
     Ranked,
     accepted_from,
+    leaves_only_noise,
     neutral_strength,
     no_progress,
     rank_only,
+    refit_from_given,
     refit_nested,
     shapes_of,
 )
@@ -343,4 +345,6 @@ def _tried(bench: Bench, effect: str, port: str) -> Ranked:
     refit_nested(bench.study, bench.data, bench.base, [row])
     if row.fitted is None:
         raise ModelError(f"{row.label}: cannot be fitted: {row.failure}")
+    if not leaves_only_noise(bench.study, bench.data, bench.floor, row):
+        refit_from_given(bench.study, bench.data, bench.base, row)
     return row

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.compare import compare
 from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.explain import ranking
@@ -121,3 +122,13 @@ def test_an_elective_effect_is_not_ranked_and_may_be_added(study: Study) -> None
     bench = open_bench(study)
     assert "stop_above" not in {row.effect for row in ranking(bench)[0]}
     assert add(study, "stop_above", anyway=True).step == "add"
+
+
+def test_an_unknown_parameter_of_an_accepted_effect_is_refused_with_those_that_it_has(
+    study: Study,
+) -> None:
+    add(study, "constant_force")
+    file = study.folder / "study.toml"
+    file.write_text(file.read_text("utf-8").replace("{ F0 =", "{ F ="), "utf-8")
+    with pytest.raises(ModelError, match=r"load_constant_force_F', .*load_constant_force_F0"):
+        open_bench(open_study(study.folder))

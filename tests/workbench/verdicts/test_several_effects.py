@@ -107,3 +107,5 @@ def test_friction_that_falls_with_speed_is_not_taken_for_dry_friction_and_drag(t
     assert falling.accepted
     assert (verdict.word, verdict.members[0]) == ("missing_effect", "coulomb@shaft")
     assert verdict.beside == ("quadratic_drag@shaft",)
+    rest = "beside quadratic_drag@shaft, which by itself takes the held-out error from "
+    assert verdict.text.startswith(rest)

@@ -30,6 +30,7 @@ from rigwatch.workbench.explain.sets.enlarging import (
     most_promising,
     scored_with,
 )
+from rigwatch.workbench.fit import begun_from_larger
 from rigwatch.workbench.ranking import (
     AGAIN,
     MUCH_WORSE,
@@ -189,6 +190,17 @@ def without(bench: Bench, whole: Combination, left_out: Ranked) -> Combination |
             return None
         fitted, rows = own.fitted, [*rows, own]
     return Combination(tuple(rows))
+
+
+def at_its_best(bench: Bench, rest: Combination, whole: Combination) -> Combination:
+    """A set without one of its effects, begun where the whole set ended if it leaves less there.
+
+    The effect left out may only have led the others out of a local minimum.
+    """
+    fitted = begun_from_larger(bench.study, bench.data, rest.fitted, whole.fitted)
+    if fitted is rest.fitted:
+        return rest
+    return Combination((*rest.rows[:-1], replace(rest.rows[-1], fitted=fitted)))
 
 
 def simplest_of_best(every: Sequence[Combination]) -> Combination:

@@ -25,6 +25,7 @@ from rigwatch.workbench.explain.sets.combination import (
 )
 from rigwatch.workbench.explain.sets.combinations import (
     UNLIMITED,
+    at_its_best,
     combinations,
     simplest_of_best,
     without,
@@ -222,7 +223,9 @@ def _judge_each(
 ) -> tuple[Combination | None, list[_Member]]:
     """A better set if leaving out or replacing an effect gives one, and the verdict on each."""
     each_left_out = [(row, without(bench, best, row)) for row in best.rows]
-    rests = [(row, rest) for row, rest in each_left_out if rest is not None]
+    rests = [
+        (row, at_its_best(bench, rest, best)) for row, rest in each_left_out if rest is not None
+    ]
     as_good = [rest for _, rest in rests if not_worse(rest, best)]
     if as_good:
         # A needless effect takes part of another's, and hides what that cannot be told from.
@@ -301,7 +304,7 @@ def _set_verdict(
     return replace(
         found,
         best=row,
-        text=f"with {_rest(bench, others, first)}: {found.text}{_how_to_add(row, others)}",
+        text=f"beside {_rest(bench, others, first)}, {found.text}{_how_to_add(row, others)}",
         second=second,
         evidence=Evidence(left, found.evidence.margin),
         beside=others,
@@ -315,11 +318,13 @@ def _named_alone(part: _Member, alone: Mapping[str, Ranked]) -> Ranked:
 
 
 def _rest(bench: Bench, others: Sequence[str], part: _Member) -> str:
-    """The rest of a set, and from where to where it alone brings the held-out error."""
+    """The rest of a set, and from where to where it brings the held-out error without the named."""
     if part.without is None:
         return _joined(others)
-    before, alone = bench.base.told_error, part.without.told_error
-    return f"{_joined(others)} ({before:.3g} → {alone:.3g} {bench.base.told_in})"
+    before, left = bench.base.told_error, part.without.told_error
+    errors = f"the held-out error from {before:.3g} to {left:.3g} {bench.base.told_in}"
+    alone = "which by itself takes" if len(others) == 1 else "which by themselves take"
+    return f"{_joined(others)}, {alone} {errors}"
 
 
 def _how_to_add(row: Ranked, others: Sequence[str]) -> str:
