@@ -34,7 +34,7 @@ from monitor.alarms.operator import addressed, refusal
 from monitor.alarms.record import AlarmRecord
 from monitor.alarms.restoring import let_go, restore_from
 from monitor.alarms.state import UNSEEN, AlarmInstance, Occasion
-from monitor.alarms.telling_again import told_again
+from monitor.alarms.telling_again import next_telling
 from monitor.signals import Condition
 from rigwatch.wire.arrays import IntArray
 from rigwatch.wire.messages import NOT_PROVED, Alarm, AlarmCommand, Event, Identity
@@ -286,11 +286,13 @@ class AlarmManager:
         """Tell values again that have become better in the first samples of these conditions."""
         for condition in improving:
             alarm = self._alarms.get(condition.name)
+            if alarm is None or not alarm.active:
+                continue
             part = condition._replace(
                 active=condition.active[: len(t_ns)], value=condition.value[: len(t_ns)]
             )
-            while alarm and alarm.active and alarm.state == "unacknowledged":
-                index = told_again(alarm, part, t_ns)
+            while alarm.active and alarm.state == "unacknowledged":
+                index = next_telling(alarm, part, t_ns)
                 if index is None:
                     break
                 self._advance(int(t_ns[index]))

@@ -18,7 +18,7 @@ CHANGED = 0.05
 """Change of the value, relative to the one that was told, that is worth it."""
 
 
-def told_again(alarm: AlarmInstance, condition: Condition, t_ns: IntArray) -> int | None:
+def next_telling(alarm: AlarmInstance, condition: Condition, t_ns: IntArray) -> int | None:
     """Index of the first sample at which the alarm tells its value again; None if none.
 
     Args:

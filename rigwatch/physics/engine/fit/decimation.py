@@ -14,6 +14,9 @@ import scipy
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
+PASSED = 0.8
+"""Share of its new band that decimation passes."""
+
 
 @dataclass(frozen=True)
 class Thinning:
@@ -41,6 +44,11 @@ class Thinning:
         cut = [self._part(p) for p in np.split(signals, ends[:-1], axis=1)]
         return np.concatenate(cut, axis=1)
 
+    @property
+    def kept(self) -> float:
+        """Share of the energy of white noise that decimation keeps."""
+        return PASSED / self.factor if self.factor > 1 else 1.0
+
     def of_part(self, samples: int) -> "Thinning":
         """The decimation for one recording of a given length."""
         return replace(self, parts=(samples,))
@@ -61,4 +69,4 @@ class Thinning:
 @cache
 def _low_pass(factor: int) -> FloatArray:
     """The filter of `scipy.signal.decimate`, designed once; second-order sections (…, 6)."""
-    return np.asarray(scipy.signal.cheby1(8, 0.05, 0.8 / factor, output="sos"))
+    return np.asarray(scipy.signal.cheby1(8, 0.05, PASSED / factor, output="sos"))

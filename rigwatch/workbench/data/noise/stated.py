@@ -8,8 +8,6 @@ from rigwatch.physics.engine.fit import Recording
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.study import Study, told, told_unit
 
-PASSED = 0.8
-"""Share of its new band that decimation passes."""
 MUCH_MORE = 3.0
 """Stated noise, over that of a channel's own quietest band, above which it is remarked on."""
 
@@ -17,15 +15,12 @@ MUCH_MORE = 3.0
 def stated_rms(study: Study, recording: Recording) -> FloatArray:
     """Standard deviation of each output's noise in SI, NaN if not stated, shape (outputs,).
 
-    White noise keeps the share of its band that decimation passes.
-
     Args:
         study: its file states the noise of a sample.
         recording: which is decimated or not.
     """
-    noise, thinning = study.file.noise, recording.thinning
-    kept = PASSED / thinning.factor if thinning and thinning.factor > 1 else 1.0
-    stated = [noise.get(name, math.nan) for name in study.model.outputs]
+    kept = recording.thinning.kept if recording.thinning else 1.0
+    stated = [study.file.noise.get(name, math.nan) for name in study.model.outputs]
     return math.sqrt(kept) * np.array(stated)
 
 
