@@ -7,6 +7,7 @@ from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import Model, shipped_models
 from rigwatch.physics.engine.equations.system import Placement, compose
+from rigwatch.physics.engine.fit.problem import Problem
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.physics.engine.fit.windowed_fit import evaluate, fit
 from rigwatch.physics.engine.score.candidates import shaped
@@ -32,6 +33,15 @@ inputs.speed = { unit = "1/s" }
 states.angle = { unit = "1", derivative = "k*speed" }
 parameters.k = { value = 1.0, unit = "1" }
 outputs.y = { unit = "1", expression = "angle + 1.5*sin(3*angle)" }
+"""
+TURNING = """
+name = "turning"
+summary = "a shaft whose teeth are seen sharply, and its turns roughly"
+inputs.speed = { unit = "1/s" }
+states.angle = { unit = "1", derivative = "k*speed" }
+parameters.k = { value = 1.0, unit = "1" }
+outputs.tooth = { unit = "1", expression = "cos(8*angle)" }
+outputs.turn = { unit = "1", expression = "angle" }
 """
 
 
@@ -95,6 +105,19 @@ def test_a_window_whose_initial_state_went_astray_begins_where_the_one_before_en
     found = fit(compiled, turning, 100)
     assert found.values()["k"] == pytest.approx(1.1, rel=0.01)
     assert evaluate(found, turning, 100).rms[0] == pytest.approx(0.01, rel=0.1)
+
+
+def test_a_window_that_is_a_tooth_off_comes_back_though_its_error_is_like_others():
+    angle, astray, noise = 0.005 * np.arange(1600.0), [4, 9, 13], np.array([0.1, 0.8])
+    drawn = noise * np.random.default_rng(1).normal(size=(1600, 2))
+    seen = np.stack([np.cos(8 * angle), angle], axis=1) + drawn
+    turning = Recording(0.01, np.full((1600, 1), 0.5), seen)
+    compiled = compile_system(compose(parse(TURNING, Model, "turning")))
+    problem = Problem(compiled, turning, 100, scale=noise, substeps=4, initial=None)
+    problem.initial = angle[::100, None].copy()
+    problem.initial[astray] += 2 * np.pi / 8
+    found = problem.start_windows(compiled.parameters)
+    assert found.initial[:, 0] == pytest.approx(angle[::100], abs=0.05)
 
 
 def test_a_model_may_call_something_of_its_own_left(recording):

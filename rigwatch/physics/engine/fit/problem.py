@@ -24,9 +24,6 @@ START_STEPS = 2
 ENOUGH = 1e-3
 """Predicted reduction of a window's squared error that justifies a second one."""
 
-OUTLIER = 2.0
-"""Ratio of a window's squared error to the median above which its initial state may be wrong."""
-
 BACK = 0.8
 """Share of its squared error below which a window counts as recovered."""
 
@@ -334,7 +331,7 @@ class Problem:
         return self._cut.whole(windowed, self._lengths)
 
     def start_windows(self, parameters: FloatArray, steps: int = STEPS) -> Started:
-        """Settle, and restart diverged windows from the end of the previous window.
+        """Settle, and begin windows also where the previous one ends; the better start is kept.
 
         Initial states have local minima of their own.
 
@@ -345,7 +342,7 @@ class Problem:
         if self._best is not None and np.array_equal(self._best.parameters, parameters):
             self.initial = self._best.initial
         error, slopes = self.settle(parameters, steps)
-        found, rows = Started(parameters, self.initial, error, slopes), _outliers(error)
+        found, rows = Started(parameters, self.initial, error, slopes), _later(error)
         if not (self.system.states and len(rows)) or self._cut.parts:
             return found
         self.initial = self.initial.copy()
@@ -493,7 +490,6 @@ class Problem:
         return -both[..., 0].ravel(), both[..., 1:].reshape(error.size, m)
 
 
-def _outliers(error: FloatArray) -> IntArray:
-    """Windows, except the first, whose squared error is far above the median."""
-    size = np.sum(error**2, axis=1)
-    return np.nonzero(size[1:] > OUTLIER * np.median(size))[0] + 1
+def _later(error: FloatArray) -> IntArray:
+    """Windows, except the first, in which something is left."""
+    return np.nonzero(np.sum(error[1:] ** 2, axis=1) > 0.0)[0] + 1
