@@ -13,7 +13,7 @@ The first alarm raised while no other is unacknowledged is the first-out. In a f
 further alarms are journalled but announced only as events until the flood ends; critical alarms and
 those that require stopping the rig are always shown. A chattering alarm is one alarm with a count
 (`flapping.py`). The value of some becomes better while they stand and is told again
-(`telling_again.py`).
+(`telling.py`).
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -34,7 +34,7 @@ from monitor.alarms.operator import addressed, refusal
 from monitor.alarms.record import AlarmRecord
 from monitor.alarms.restoring import let_go, restore_from
 from monitor.alarms.state import UNSEEN, AlarmInstance, Occasion
-from monitor.alarms.telling_again import next_telling
+from monitor.alarms.telling import figure_of, next_telling
 from monitor.signals import Condition
 from rigwatch.wire.arrays import IntArray
 from rigwatch.wire.messages import NOT_PROVED, Alarm, AlarmCommand, Event, Identity
@@ -100,7 +100,7 @@ class AlarmManager:
         """
         self._follow(boot, seq, len(t_ns))
         held = list(conditions)
-        improving = [condition for condition in held if condition.improves]
+        improving = [condition for condition in held if condition.told]
         for index, name, rising, at in sorted(
             self._edges(device, boot, seq, t_ns, held), key=lambda row: row[:2]
         ):
@@ -277,6 +277,7 @@ class AlarmManager:
                 at = Occasion(
                     device, boot, seq + i, int(t_ns[i]), float(condition.value[i]),
                     float(condition.low[i]), float(condition.high[i]), edge.onset_seq,
+                    figure_of(condition, i),
                 )  # fmt: skip
                 yield i, (order_of(name), name), edge.rising, at
 
@@ -298,7 +299,7 @@ class AlarmManager:
                 self._advance(int(t_ns[index]))
                 alarm.occasion = replace(
                     alarm.occasion, boot=boot, seq=seq + index, t_ns=int(t_ns[index]),
-                    value=float(part.value[index]),
+                    value=float(part.value[index]), text=figure_of(part, index),
                 )  # fmt: skip
                 self._publish(alarm, alarm.occasion.t_ns)
 

@@ -219,7 +219,7 @@ class ObserverMonitor:
                 started & ((verdict == d.FRICTION) | sticks),
                 force,
                 0.0,
-                improves=True,
+                told="{:.3g} N of friction",
             ),
             above(kinds.STICTION, armed & sticks, kept[d.REST], 0.5),
             above(kinds.OTHER_FAULT, armed & (verdict == d.OTHER), kept[d.SHARE], np.inf),

@@ -131,8 +131,8 @@ class Condition(NamedTuple):
         value: the judged quantity, shape (n,), in the kind's unit; NaN if not judged.
         low: lower limit of `value`, shape (n,); -inf if there is none.
         high: upper limit of `value`, shape (n,); +inf if there is none.
-        improves: whether `value` is a figure that gets better while the condition holds, so that
-            its alarm tells it again.
+        told: how its alarm tells `value`, such as "{:.3g} N of friction", and tells it again where
+            it has become better; "" if it does not.
     """
 
     name: str
@@ -140,7 +140,7 @@ class Condition(NamedTuple):
     value: NDArray[np.float64]
     low: NDArray[np.float64]
     high: NDArray[np.float64]
-    improves: bool = False
+    told: str = ""
 
 
 def above(
@@ -149,11 +149,11 @@ def above(
     value: NDArray[np.float64],
     high: float,
     *,
-    improves: bool = False,
+    told: str = "",
 ) -> Condition:
     """A condition that holds above an upper limit; its arrays are read only."""
     low, limit = level(active.size, -np.inf), level(active.size, float(high))
-    return Condition(name, active.view(np.uint8), value, low, limit, improves)
+    return Condition(name, active.view(np.uint8), value, low, limit, told)
 
 
 def below(

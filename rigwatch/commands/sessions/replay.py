@@ -108,7 +108,7 @@ def _ignore(_: "Alarm") -> None:
 
 
 class Announcer:
-    """Prints an alarm as it occurs, and its value if it is told again."""
+    """Prints an alarm as it occurs, and again where its figure has become better."""
 
     def __init__(self) -> None:
         self._newest: dict[str, Alarm] = {}
@@ -121,7 +121,7 @@ class Announcer:
         before = self._newest.get(alarm.name)
         self._newest[alarm.name] = alarm
         first = ", first" if alarm.first_out else ""
-        again = f", now {alarm.value:.3g}" if before and told_again(before, alarm) else ""
+        again = ", told again" if before and told_again(before, alarm) else ""
         state = alarm.state.replace("_", " ")
         head = f"{iso_time(alarm.t_ns)}  {alarm.severity:8}  {alarm.name}: {state}{first}{again}"
         print(f"{head} ({alarm.cause})", flush=True)

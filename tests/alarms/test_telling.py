@@ -1,4 +1,4 @@
-"""A value that becomes better while its alarm stands is told again, ever more rarely."""
+"""An alarm tells its figure, and again while it stands if it becomes better, ever more rarely."""
 
 import numpy as np
 import pytest
@@ -13,12 +13,12 @@ from tests.alarms.alarm_signals import newest, order, run, spell
 BEGIN, REST, LENGTH = 10, 600, 4000
 
 
-def friction(value: np.ndarray, *, improves: bool = True) -> Condition:
+def friction(value: np.ndarray, *, words: str = "{:.3g} N of friction") -> Condition:
     """Dry friction of a force at each sample [N], from `BEGIN` to `REST` samples before the end."""
     n = value.size
     limit = np.zeros(n)
     active = spell(n, (BEGIN, n - REST))
-    return Condition("dry_friction", active, value, limit - np.inf, limit, improves)
+    return Condition("dry_friction", active, value, limit - np.inf, limit, words)
 
 
 def told(said: list) -> list[tuple[int, str, float]]:
@@ -37,6 +37,26 @@ def test_a_force_that_settles_is_told_once_more() -> None:
     assert over[1] == "cleared_unacknowledged"
 
 
+def test_the_force_stands_in_the_cause_and_what_was_told_last_remains() -> None:
+    force = np.full(LENGTH, 0.5)
+    force[:40] = 0.3
+
+    said = run(AlarmManager(), [friction(force)])
+
+    first, again, over = [one.cause.rsplit(": ")[-1] for one in said if isinstance(one, Alarm)]
+    assert first == "0.3 N of friction"
+    assert again == over == "0.5 N of friction"
+
+
+@pytest.mark.parametrize("force", [0.0, np.nan])
+def test_a_force_that_is_not_known_yet_is_not_told(force: float) -> None:
+    first, *_ = run(AlarmManager(), [friction(np.full(LENGTH, force))])
+
+    assert isinstance(first, Alarm)
+    assert "friction:" not in first.cause.removeprefix("dry friction:")
+    assert first.cause.endswith("dirt")
+
+
 def test_a_force_that_grows_is_told_as_the_alarm_grows_twice_as_old() -> None:
     found = told(run(AlarmManager(), [friction(np.arange(LENGTH, dtype=float))]))
 
@@ -46,13 +66,13 @@ def test_a_force_that_grows_is_told_as_the_alarm_grows_twice_as_old() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "improves"), [(0.04, True), (0.3, False)], ids=["small", "not of this condition"]
+    ("change", "words"), [(0.04, "{:g} N"), (0.3, "")], ids=["small", "not of this condition"]
 )
-def test_other_changes_are_not_told(change: float, improves: bool) -> None:
+def test_other_changes_are_not_told(change: float, words: str) -> None:
     force = np.full(LENGTH, 0.5 * (1.0 + change))
     force[:40] = 0.5
 
-    assert len(told(run(AlarmManager(), [friction(force, improves=improves)]))) == 2
+    assert len(told(run(AlarmManager(), [friction(force, words=words)]))) == 2
 
 
 def test_nobody_is_told_again_who_has_acknowledged() -> None:

@@ -1,4 +1,4 @@
-"""When a standing alarm tells its value again.
+"""How an alarm tells its value, and when a standing one tells it again.
 
 A force is known roughly when friction is named, and better once the motion has reversed some more;
 or it grows. The alarm then tells it again: the same alarm in the same state, which nobody is called
@@ -16,6 +16,12 @@ FIRST_NS = 250_000_000
 """Age at which a value may be told again for the first time [ns]."""
 CHANGED = 0.05
 """Change of the value, relative to the one that was told, that is worth it."""
+
+
+def figure_of(condition: Condition, index: int) -> str:
+    """The value of a condition at a sample in words; "" if it does not tell it, or is not known."""
+    value = float(condition.value[index])
+    return condition.told.format(value) if np.isfinite(value) and value != 0.0 else ""
 
 
 def next_telling(alarm: AlarmInstance, condition: Condition, t_ns: IntArray) -> int | None:
