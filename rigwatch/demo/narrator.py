@@ -245,9 +245,11 @@ class Narrator:
             return
         study = f"{self._studies}/{alarm}-*"
         self._say(
-            "            next, how strong it is: Open as a study, at the alarm in the workbench;"
+            "            next, how strong it is (the demo goes on meanwhile): Open as a study,"
         )
-        self._say("            then explain and add the effect there, or by commands:")
+        self._say(
+            "            at the alarm in the workbench, then explain and add it; or by commands:"
+        )
         self._say(f"              $ rigwatch explain {study}")
         self._say(f"              $ rigwatch add {study} {effect} --port {port}")
 

@@ -237,8 +237,8 @@ def test_what_is_missing_in_the_model_is_told_and_other_events_are_not() -> None
         "measured friction: 0.44 N, 1.02 times the",
         "0.43 N of the recording with known friction, from which its model was made",
         "more about it: $ rigwatch effects coulomb",
-        "next, how strong it is: Open as a study, at the alarm in the workbench;",
-        "then explain and add the effect there, or by commands:",
+        "next, how strong it is (the demo goes on meanwhile): Open as a study,",
+        "at the alarm in the workbench, then explain and add it; or by commands:",
         "$ rigwatch explain demo/studies/dry_friction-*",
         "$ rigwatch add demo/studies/dry_friction-* coulomb --port load",
     ]
