@@ -61,26 +61,25 @@ class Drive:
         self._running: dict[Future[list[Outcome]], _Task] = {}
         self._seconds, self._labels = 0.0, (f"{uuid4()}/{number}" for number in count())
 
-    def __iter__(self) -> Iterator[Outcome]:
-        """Outcomes as they come; those that come together in the order of their units."""
+    def __iter__(self) -> Iterator[list[Outcome]]:
+        """Outcomes as they come; those of a task together, in the order of its units."""
         self._fill()
         while self._running:
             done, _ = wait(self._running, _LOOK_AGAIN_S, FIRST_COMPLETED)
             if not done:
-                yield from self._forgotten()
+                yield self._forgotten()
             for future in [one for one in self._running if one in done]:
-                yield from self._collected(future)
+                yield self._collected(future)
             self._fill()
 
-    def _forgotten(self) -> Iterator[Outcome]:
+    def _forgotten(self) -> list[Outcome]:
         """Units of tasks that a broken pool lost without reporting them."""
         if not self._pool.workers:
             self._say("no worker is left: waiting for one")
         self._pool.check()
         old = [one for one, t in self._running.items() if t.generation < self._pool.generation]
-        for future in old:
-            if not future.done():
-                yield from self._died(self._running.pop(future))
+        lost = [self._running.pop(future) for future in old if not future.done()]
+        return [dead for task in lost for dead in self._died(task)]
 
     def _fill(self) -> None:
         window = 2 * max(1, self._pool.workers)
@@ -105,50 +104,49 @@ class Drive:
         future = self._pool.submit(self._run, units, next(self._labels))
         self._running[future] = _Task(units, self._pool.generation, alone)
 
-    def _collected(self, future: "Future[list[Outcome]]") -> Iterator[Outcome]:
+    def _collected(self, future: "Future[list[Outcome]]") -> list[Outcome]:
         task = self._running.pop(future)
         try:
             outcomes = future.result()
         except BrokenExecutor:
             self._pool.renew(task.generation)
-            yield from self._died(task)
-            return
+            return self._died(task)
         except CancelledError:
             raise BatchError("the scheduler is gone or has cancelled the work") from None
         except BatchError:
             raise
         except Exception as error:
             if type(error).__name__ == "KilledWorker":  # Dask's, which need not be installed
-                yield from self._died(task, self._retries)
-            else:
-                yield from self._refused(task, error)
-            return
+                return self._died(task, self._retries)
+            return self._refused(task, error)
         for outcome in outcomes:
             self._measure(outcome.seconds)
-            yield outcome
+        return outcomes
 
     def _measure(self, seconds: float) -> None:
         self._seconds += 0.2 * (seconds - self._seconds) if self._seconds else seconds
 
-    def _died(self, task: _Task, deaths: int = 1) -> Iterator[Outcome]:
-        """Units of a worker that died so many times."""
+    def _died(self, task: _Task, deaths: int = 1) -> list[Outcome]:
+        """Units of a worker that died so many times: those that are given up."""
+        dead = []
         for unit in task.units:
             self._lost[unit] += 1
             self._alone[unit] += deaths * task.alone
             if self._alone[unit] >= self._retries:
-                yield _dead(unit)
+                dead.append(_dead(unit))
             elif self._lost[unit] > 1:
                 self._suspects.append(unit)
             else:
                 self._again.append(unit)
+        return dead
 
-    def _refused(self, task: _Task, error: Exception) -> Iterator[Outcome]:
+    def _refused(self, task: _Task, error: Exception) -> list[Outcome]:
         """A task that could not be sent or answered: alone, each unit shows whether it can."""
         if len(task.units) > 1:
             self._again.extend(task.units)
-            return
+            return []
         text = f"{task.units[0]}: {one_line(error)}"
-        yield Outcome(task.units[0], "", b"", type(error).__name__, text)
+        return [Outcome(task.units[0], "", b"", type(error).__name__, text)]
 
 
 def _dead(unit: str) -> Outcome:

@@ -109,9 +109,10 @@ def _settled(name: str, value: Any) -> Any:
     return value
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
+class Outcome(msgspec.Struct, frozen=True):
     """The result of one unit, or why there is none.
+
+    A structure is sent from a worker to the client in a quarter of the time of a dataclass.
 
     Attributes:
         path: the recording or study.

@@ -5,9 +5,10 @@ For Parquet the lines are kept beside the file until all results are there.
 """
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 import msgspec
 
@@ -53,6 +54,14 @@ def as_line(outcome: Outcome, work: str) -> bytes:
     return msgspec.json.encode(line) + b"\n"
 
 
+class _Place(NamedTuple):
+    """Where a line lies, and the kind of failure that it holds, "" for a result."""
+
+    at: int
+    length: int
+    kind: str
+
+
 class Journal:
     """The results so far, in a file or in memory.
 
@@ -67,7 +76,7 @@ class Journal:
 
     def __init__(self, file: Path | None, work: str) -> None:
         self.file, self.work = file, work
-        self._lines: dict[str, tuple[int, int]] = {}
+        self._lines: dict[str, _Place] = {}
         self._memory = bytearray()
         self._file = None if file is None else self._opened(file)
         try:
@@ -126,31 +135,42 @@ class Journal:
         if line.work != self.work:
             text = "holds results of another job, other settings or another version of rigwatch"
             raise BatchError(f"{self.file}: {text}, expected a new file")
-        self._lines[line.path] = at, len(raw)
+        self._lines[line.path] = _Place(at, len(raw), line.kind)
 
     def get(self, path: str) -> Outcome | None:
         """The result of a unit, None if there is none."""
         place = self._lines.get(path)
         return None if place is None else _DECODER.decode(self._at(place)).outcome()
 
-    def add(self, outcome: Outcome) -> None:
-        """Append a result; it replaces an earlier one of the same unit.
+    def kinds(self, paths: Iterable[str]) -> Iterator[str]:
+        """Kind of failure of each unit that was done, "" for one that has a result."""
+        return (self._lines[path].kind for path in paths if path in self._lines)
+
+    def add(self, outcomes: Sequence[Outcome]) -> None:
+        """Append results that came together; each replaces an earlier one of its unit.
 
         Raises:
             BatchError: the disk is full or gone.
         """
-        raw = as_line(outcome, self.work)
+        lines = [as_line(outcome, self.work) for outcome in outcomes]
+        at = self._append(b"".join(lines))
+        for outcome, line in zip(outcomes, lines, strict=True):
+            self._lines[outcome.path] = _Place(at, len(line), outcome.kind)
+            at += len(line)
+
+    def _append(self, raw: bytes) -> int:
+        """Write at the end, in one piece; return where it begins."""
         if self._file is None:
-            self._lines[outcome.path] = len(self._memory), len(raw)
+            at = len(self._memory)
             self._memory += raw
-            return
+            return at
         try:
             at = self._file.seek(0, os.SEEK_END)
             self._file.write(raw)
             self._file.flush()
         except OSError as error:
             raise BatchError(f"{self.file}: cannot be written: {reason_of(error)}") from None
-        self._lines[outcome.path] = at, len(raw)
+        return at
 
     def outcomes(self, paths: Iterable[str]) -> Iterator[Outcome]:
         """Results of the units, in the given order."""
@@ -174,8 +194,8 @@ class Journal:
         if beside != self.file:
             beside.unlink()
 
-    def _at(self, place: tuple[int, int]) -> bytes:
-        at, length = place
+    def _at(self, place: _Place) -> bytes:
+        at, length, _ = place
         if self._file is None:
             return bytes(self._memory[at : at + length])
         return os.pread(self._file.fileno(), length, at)
@@ -183,7 +203,8 @@ class Journal:
     def close(self) -> None:
         """Close the file."""
         if self._file is not None:
-            self._file.close()
+            with suppress(OSError):  # it tries once more to write what could not be, as was said
+                self._file.close()
             self._alone.give_up()
 
 

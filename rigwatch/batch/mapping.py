@@ -35,7 +35,7 @@ class Results:
     def __init__(self, journal: Journal, paths: list[str]) -> None:
         self.file = journal.file
         self._kept = None if self.file else list(journal.outcomes(paths))
-        found = Counter(outcome.kind for outcome in journal.outcomes(paths))
+        found = Counter(journal.kinds(paths))
         self.done = found.pop("", 0)
         self.failed = dict(sorted(found.items()))
 
@@ -131,10 +131,11 @@ def map_units(
         if left:
             with _pool(wanted, executor) as pool:
                 run = partial(_run, wanted, settings)
-                for outcome in Drive(pool, run, left, retries, say):
-                    journal.add(outcome)
-                    progress.add(failed=outcome.failed)
-                    seen(outcome)
+                for outcomes in Drive(pool, run, left, retries, say):
+                    journal.add(outcomes)
+                    for outcome in outcomes:
+                        progress.add(failed=outcome.failed)
+                        seen(outcome)
         journal.finish(units)
         return Results(journal, units)
     finally:

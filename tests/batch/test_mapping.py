@@ -201,7 +201,7 @@ def test_short_units_go_in_long_tasks_and_at_the_end_in_shorter_ones_that_are_wo
 
     units = [f"{number:05d}" for number in range(5000)]
     found = Drive(Pool(None), run, units, RETRIES, lambda _: None)
-    assert [outcome.path for outcome in found] == units
+    assert [outcome.path for outcomes in found for outcome in outcomes] == units
     timed = lengths[2:]  # two begin before the time of a unit is known
     assert timed == sorted(timed, reverse=True)
     assert timed[0] == LARGEST_TASK
