@@ -5,7 +5,9 @@ its recorder was killed) counts as one with alarms. The size stays within its li
 checks too: each leaves room for as much as was recorded since the last one.
 """
 
+import contextlib
 import math
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +27,7 @@ EVERY = 60.0
 class Segment:
     """A segment on the disk: path, end as Unix time [s], size [bytes], whether it has alarms."""
 
-    path: Path
+    path: str
     ended: float
     size: int
     alarms: bool
@@ -41,7 +43,8 @@ class Retention:
 
     def __init__(self, settings: RecorderSection, rig: str) -> None:
         self._settings, self._rig = settings, rig
-        self._alarms: dict[Path, bool] = {}
+        # By text: a path of its own takes a kilobyte, and a year has thousands of segments.
+        self._alarms: dict[str, bool] = {}
         self._due = 0.0
         self._left = math.inf
 
@@ -56,7 +59,7 @@ class Retention:
         if now < self._due:
             return []
         self._due = now + EVERY
-        removed = [one for one in self.expired(t_ns / 1e9, current) if _remove(one.path)]
+        removed = [one for one in self.expired(t_ns / 1e9, current) if _remove(Path(one.path))]
         if not removed:
             return []
         size = sum(one.size for one in removed) / 1e6
@@ -76,20 +79,20 @@ class Retention:
         return gone
 
     def _segments(self, newest: Path | None) -> Iterator[Segment]:
-        root = Path(self._settings.folder)
-        segments = (one for own in sessions_of(root, self._rig) for one in own.glob(f"*{SUFFIX}"))
-        for path in segments:
-            if path == newest:
-                continue
-            try:
-                found = path.stat()
-            except OSError:
-                continue
-            yield Segment(path, found.st_mtime, found.st_size, self._has_alarms(path))
+        for folder in sessions_of(Path(self._settings.folder), self._rig):
+            for entry in _segments_in(folder):
+                if newest is not None and entry.path == str(newest):
+                    continue
+                try:
+                    found = entry.stat()
+                except OSError:
+                    continue
+                alarms = self._has_alarms(entry.path)
+                yield Segment(entry.path, found.st_mtime, found.st_size, alarms)
 
-    def _has_alarms(self, path: Path) -> bool:
+    def _has_alarms(self, path: str) -> bool:
         if path not in self._alarms:
-            counts = topic_counts(path)
+            counts = topic_counts(Path(path))
             self._alarms[path] = counts is None or counts.get(ALARMS.name, 0) > 0
         return self._alarms[path]
 
@@ -107,13 +110,20 @@ def _remove(path: Path) -> bool:
     return True
 
 
+def _segments_in(folder: Path) -> Iterator[os.DirEntry[str]]:
+    """A session's segments; none of one that is removed meanwhile."""
+    with contextlib.suppress(OSError), os.scandir(folder) as found:
+        yield from (entry for entry in found if entry.name.endswith(SUFFIX))
+
+
 def _newest(current: Path) -> Path | None:
     """The segment that is being written."""
     return max(current.glob(f"*{SUFFIX}"), default=None)
 
 
 def _size_in(folder: Path, segments: list[Segment]) -> int:
-    return sum(one.size for one in segments if one.path.parent == folder)
+    own = f"{folder}{os.sep}"
+    return sum(one.size for one in segments if one.path.startswith(own))
 
 
 def _size(path: Path) -> int:

@@ -1,6 +1,7 @@
 """Old recordings go by age and size; those with alarms stay longer, the present one always."""
 
 import os
+import tracemalloc
 from pathlib import Path
 
 from rigwatch.recorder import POSITIONS
@@ -133,7 +134,23 @@ def test_what_others_remove_is_forgotten(tmp_path: Path) -> None:
     segment(current, 1, 0.0)
     retention = rules(tmp_path, keep_days=400.0)
     assert retention.expired(NOW, current) == []
-    assert set(retention._alarms) == {path}
+    assert set(retention._alarms) == {str(path)}
     path.unlink()
     assert retention.expired(NOW, current) == []
     assert not retention._alarms
+
+
+def test_a_segment_that_is_kept_costs_little_memory(tmp_path: Path) -> None:
+    current = tmp_path / "bench-20260301T000000Z"
+    first = segment(current, 0, age_days=1.0)
+    retention = rules(tmp_path, keep_gigabytes=1.0)
+    count = 500
+    for number in range(1, count + 1):
+        (current / f"{number:06d}.mcap").hardlink_to(first)
+    retention.expired(NOW, current)
+    tracemalloc.start()
+    retention._alarms.clear()
+    retention.expired(NOW, current)
+    kept, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert kept < 300 * count, "a year has thousands of them"
