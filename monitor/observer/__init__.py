@@ -14,7 +14,6 @@ from monitor.observer import decision_state
 from monitor.observer.channel_jumps import ChannelJumps, bends_of
 from monitor.observer.decision_state import (
     DEVIATIONS,
-    EVIDENCE,
     LASTING,
     MEDIUM,
     OUTPUTS,
@@ -65,7 +64,6 @@ __all__ = [
     "DISAGREE",
     "DRY_UNIT",
     "EMPTY",
-    "EVIDENCE",
     "LASTING",
     "MATCHED",
     "MEASURED",

@@ -28,14 +28,14 @@ UNNAMED, FRICTION, STICKING, OTHER = 0.0, 1.0, 2.0, 3.0
 
 OUTPUTS = (
     "mode", "deviation", "force", "viscous", "named_force", "share", "dry_share", "rest",
-    "verdict", "sensors", "spread", "departed", "amplitude", "deviations", "evidence",
+    "verdict", "sensors", "spread", "departed", "amplitude", "deviations",
 )  # fmt: skip
 (
     MODE, DEVIATION, FORCE, VISCOUS, NAMED_FORCE, SHARE, DRY_SHARE, REST,
-    VERDICT, SENSORS, SPREAD, DEPARTED, AMPLITUDE, DEVIATIONS, EVIDENCE,
+    VERDICT, SENSORS, SPREAD, DEPARTED, AMPLITUDE, DEVIATIONS,
 ) = range(len(OUTPUTS))  # fmt: skip
 
-USUAL_LASTING, USUAL_SHORT, USUAL_MEDIUM, USUAL_FRICTION, USUAL_ONSET = range(5)
+USUAL_LASTING, USUAL_SHORT, USUAL_MEDIUM, USUAL_FRICTION = range(4)
 """Rows of the healthy residual's extremes at the present motion, see `usual_error.Extremes`."""
 
 (

@@ -2,7 +2,6 @@
 
     e ─▶ energies of a short and a medium window ─┐
     e, g ─▶ Coulomb and viscous force (window) ───┼▶ departure ─▶ episode ─▶ verdict
-    e, g ─▶ evidence of the onset of dry friction ┤
     two views of the measured output ─────────────┘
 
 Energies are relative to the healthy variance n² + κ·A, with A mean squares and fourth powers of the
@@ -36,7 +35,6 @@ from monitor.observer.decision_state import (
     DISAGREE,
     DRY_SHARE,
     ERROR,
-    EVIDENCE,
     FORCE,
     FRICTION,
     HISTORY,
@@ -62,7 +60,6 @@ from monitor.observer.decision_state import (
     USUAL_FRICTION,
     USUAL_LASTING,
     USUAL_MEDIUM,
-    USUAL_ONSET,
     USUAL_SHORT,
     VERDICT,
     VISCOUS,
@@ -100,7 +97,6 @@ from monitor.observer.window_statistics import (
     friction,
     lasting_energy,
     mean_square,
-    onset_evidence,
     rest,
     reversals,
     unrecorded_friction,
@@ -332,18 +328,16 @@ def _one(  # noqa: PLR0917 -- a kernel
     allowed = _friction_limit(usual[USUAL_FRICTION], rules)
     largest = max(np.sqrt(short), np.sqrt(medium), deviations / allowed)
     lasting = lasting_energy(kept, spread**2 * usual[USUAL_LASTING] * margin)
-    out[EVIDENCE, k] = onset_evidence(kept, spread)
-    onset = out[EVIDENCE, k] / (usual[USUAL_ONSET] * np.sqrt(margin))
     # A motion of another size than under the same drive before: slow evidence, never at once.
     size = min(response, SURE)
-    out[DEVIATION, k] = max(largest, np.sqrt(out[SENSORS, k]), np.sqrt(lasting), size, onset)
+    out[DEVIATION, k] = max(largest, np.sqrt(out[SENSORS, k]), np.sqrt(lasting), size)
     away = out[DEVIATION, k] > 1.0
     count[QUIET] = 0 if away else count[QUIET] + 1
     count[ABOVE] = count[ABOVE] + 1 if away else 0
     if count[ONSET] < 0:
         exact = mean_square(kept, LATENESS, MEDIUM) + mean_square(kept, UNDECIDED, MEDIUM) == 0.0
         known = 0.0 if np.isinf(usual[USUAL_SHORT]) or not exact else largest
-        away = count[ABOVE] >= REMAINS or _sure(out[DEVIATION, k], known, onset, kept)
+        away = count[ABOVE] >= REMAINS or _sure(out[DEVIATION, k], known, kept)
     away = away or count[JUMP_AGO] == 0
     mode = _mode(kept, rules)
     out[MODE, k] = mode
@@ -389,7 +383,7 @@ def _unrecorded(  # noqa: PLR0917 -- a kernel
 
 
 @part()
-def _sure(deviation: float, known: float, onset: float, kept: DecisionState) -> bool:
+def _sure(deviation: float, known: float, kept: DecisionState) -> bool:
     """Whether a deviation is a departure at once.
 
     Where steps that slide fall is not known of every input, and the lateness jumps by a sample.
@@ -398,14 +392,11 @@ def _sure(deviation: float, known: float, onset: float, kept: DecisionState) -> 
         deviation: the largest.
         known: that of the residual from the healthy one at this very motion; 0 if that or the
             instants of the inputs are not known.
-        onset: evidence of the onset of dry friction, relative to its limit at this very motion; 0
-            if that is not known.
         kept: the state.
     """
     if is_late(kept.lateness):
         return kept.counts[ABOVE] >= MEDIUM and rubs(kept.lateness)
-    new = known > SURELY_NEW or onset > 1.0
-    return deviation > SURE or (new and not seems_late(kept.lateness))
+    return deviation > SURE or (known > SURELY_NEW and not seems_late(kept.lateness))
 
 
 @part()
