@@ -43,12 +43,14 @@ def test_a_value_told_again_is_printed_with_it(capsys: pytest.CaptureFixture[str
 
     announce = Announcer()
     announce(alarm)
-    announce(replace(alarm, seq=alarm.seq + 64, value=0.47))
+    figure = f"{alarm.cause}: 0.47 N of friction"
+    announce(replace(alarm, seq=alarm.seq + 64, value=0.47, cause=figure))
 
     first, again = capsys.readouterr().out.splitlines()
     assert "dry_friction: unacknowledged" in first
     assert ", told again" not in first
     assert ", told again (" in again
+    assert again.endswith(": 0.47 N of friction)")
 
 
 def test_a_recording_too_short_to_arm_says_that_nothing_was_judged(
