@@ -136,6 +136,10 @@ class HealthyLimits(Section, frozen=True, kw_only=True):
     steady_frictions: Annotated[
         Floats, Meta(description="largest Coulomb estimate of each in standard deviations")
     ] = ()
+    steady_onsets: Annotated[
+        Floats,
+        Meta(description="largest evidence of the onset of dry friction of each, in the same"),
+    ] = ()
 
 
 class SchemeSection(Section, frozen=True, kw_only=True):

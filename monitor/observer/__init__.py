@@ -14,6 +14,7 @@ from monitor.observer import decision_state
 from monitor.observer.channel_jumps import ChannelJumps, bends_of
 from monitor.observer.decision_state import (
     DEVIATIONS,
+    EVIDENCE,
     LASTING,
     MEDIUM,
     OUTPUTS,
@@ -64,6 +65,7 @@ __all__ = [
     "DISAGREE",
     "DRY_UNIT",
     "EMPTY",
+    "EVIDENCE",
     "LASTING",
     "MATCHED",
     "MEASURED",

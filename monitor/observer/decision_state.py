@@ -28,14 +28,14 @@ UNNAMED, FRICTION, STICKING, OTHER = 0.0, 1.0, 2.0, 3.0
 
 OUTPUTS = (
     "mode", "deviation", "force", "viscous", "named_force", "share", "dry_share", "rest",
-    "verdict", "sensors", "spread", "departed", "amplitude", "deviations",
+    "verdict", "sensors", "spread", "departed", "amplitude", "deviations", "evidence",
 )  # fmt: skip
 (
     MODE, DEVIATION, FORCE, VISCOUS, NAMED_FORCE, SHARE, DRY_SHARE, REST,
-    VERDICT, SENSORS, SPREAD, DEPARTED, AMPLITUDE, DEVIATIONS,
+    VERDICT, SENSORS, SPREAD, DEPARTED, AMPLITUDE, DEVIATIONS, EVIDENCE,
 ) = range(len(OUTPUTS))  # fmt: skip
 
-USUAL_LASTING, USUAL_SHORT, USUAL_MEDIUM, USUAL_FRICTION = range(4)
+USUAL_LASTING, USUAL_SHORT, USUAL_MEDIUM, USUAL_FRICTION, USUAL_ONSET = range(5)
 """Rows of the healthy residual's extremes at the present motion, see `usual_error.Extremes`."""
 
 (
@@ -62,6 +62,7 @@ class Counts(NamedTuple):
     judging: int = 12
     lasted: int = 13
     since_known: int = 14
+    since_gap: int = 15
 
 
 AT = Counts()

@@ -2,6 +2,7 @@
 
     e ─▶ energies of a short and a medium window ─┐
     e, g ─▶ Coulomb and viscous force (window) ───┼▶ departure ─▶ episode ─▶ verdict
+    e, g ─▶ evidence of the onset of dry friction ┤
     two views of the measured output ─────────────┘
 
 Energies are relative to the healthy variance n² + κ·A, with A mean squares and fourth powers of the
@@ -35,6 +36,7 @@ from monitor.observer.decision_state import (
     DISAGREE,
     DRY_SHARE,
     ERROR,
+    EVIDENCE,
     FORCE,
     FRICTION,
     HISTORY,
@@ -60,6 +62,7 @@ from monitor.observer.decision_state import (
     USUAL_FRICTION,
     USUAL_LASTING,
     USUAL_MEDIUM,
+    USUAL_ONSET,
     USUAL_SHORT,
     VERDICT,
     VISCOUS,
@@ -97,6 +100,7 @@ from monitor.observer.window_statistics import (
     friction,
     lasting_energy,
     mean_square,
+    onset_evidence,
     rest,
     reversals,
     unrecorded_friction,
@@ -107,8 +111,8 @@ from rigwatch.wire.kernel import kernel, part
 
 (
     HEAD, FILLED, SINCE_START, QUIET, OUTSIDE, ONSET, DEPARTURE_AGO, AGREED, DISAGREED, CHANGED,
-    ABOVE, JUMP_AGO, WAS_JUDGING, LASTED, KNOWN_AGO,
-) = range(15)  # fmt: skip
+    ABOVE, JUMP_AGO, WAS_JUDGING, LASTED, KNOWN_AGO, GAP_AGO,
+) = range(16)  # fmt: skip
 """Indices of `decision_state.Counts` as constants for the kernel."""
 LOOKS = 3
 """Consecutive samples that must agree on friction."""
@@ -172,6 +176,7 @@ def decide(  # noqa: PLR0917 -- a kernel
         if state[k] == FIRST:
             _restart(kept)
         _follow_drive(drive[k], steady[k], kept)
+        kept.counts[GAP_AGO] = 0 if state[k] == TAINTED else kept.counts[GAP_AGO] + 1
         if state[k] != TAINTED:
             _follow_inputs(kept, judged[k], usual[:, k], rules)
             _remember(kept, judged[k], speed[k], levels[k])
@@ -328,16 +333,20 @@ def _one(  # noqa: PLR0917 -- a kernel
     allowed = _friction_limit(usual[USUAL_FRICTION], rules)
     largest = max(np.sqrt(short), np.sqrt(medium), deviations / allowed)
     lasting = lasting_energy(kept, spread**2 * usual[USUAL_LASTING] * margin)
+    out[EVIDENCE, k] = onset_evidence(kept, spread)
+    exact = mean_square(kept, LATENESS, MEDIUM) + mean_square(kept, UNDECIDED, MEDIUM) == 0.0
+    onset = out[EVIDENCE, k] / (usual[USUAL_ONSET] * np.sqrt(margin))
+    if not exact or count[GAP_AGO] < LONG:
+        onset = 0.0
     # A motion of another size than under the same drive before: slow evidence, never at once.
     size = min(response, SURE)
-    out[DEVIATION, k] = max(largest, np.sqrt(out[SENSORS, k]), np.sqrt(lasting), size)
+    out[DEVIATION, k] = max(largest, np.sqrt(out[SENSORS, k]), np.sqrt(lasting), size, onset)
     away = out[DEVIATION, k] > 1.0
     count[QUIET] = 0 if away else count[QUIET] + 1
     count[ABOVE] = count[ABOVE] + 1 if away else 0
     if count[ONSET] < 0:
-        exact = mean_square(kept, LATENESS, MEDIUM) + mean_square(kept, UNDECIDED, MEDIUM) == 0.0
         known = 0.0 if np.isinf(usual[USUAL_SHORT]) or not exact else largest
-        away = count[ABOVE] >= REMAINS or _sure(out[DEVIATION, k], known, kept)
+        away = count[ABOVE] >= REMAINS or _sure(out[DEVIATION, k], known, onset, kept)
     away = away or count[JUMP_AGO] == 0
     mode = _mode(kept, rules)
     out[MODE, k] = mode
@@ -383,7 +392,7 @@ def _unrecorded(  # noqa: PLR0917 -- a kernel
 
 
 @part()
-def _sure(deviation: float, known: float, kept: DecisionState) -> bool:
+def _sure(deviation: float, known: float, onset: float, kept: DecisionState) -> bool:
     """Whether a deviation is a departure at once.
 
     Where steps that slide fall is not known of every input, and the lateness jumps by a sample.
@@ -392,11 +401,14 @@ def _sure(deviation: float, known: float, kept: DecisionState) -> bool:
         deviation: the largest.
         known: that of the residual from the healthy one at this very motion; 0 if that or the
             instants of the inputs are not known.
+        onset: evidence of the onset of dry friction, relative to its limit at this very motion; 0
+            if that or the instants of the inputs are not known.
         kept: the state.
     """
     if is_late(kept.lateness):
         return kept.counts[ABOVE] >= MEDIUM and rubs(kept.lateness)
-    return deviation > SURE or (known > SURELY_NEW and not seems_late(kept.lateness))
+    new = known > SURELY_NEW or onset > 1.0
+    return deviation > SURE or (new and not seems_late(kept.lateness))
 
 
 @part()

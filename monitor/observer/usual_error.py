@@ -45,7 +45,8 @@ STEEPEST = 6.0
 
 
 class Extremes(NamedTuple):
-    """Largest values of a healthy residual: energies of three windows, and of the friction.
+    """Largest values of a healthy residual: energies of three windows, friction, and evidence of
+    its onset.
 
     In the order of `USUAL_LASTING` and so on in `decision_state.py`.
     """
@@ -54,6 +55,7 @@ class Extremes(NamedTuple):
     short: float = np.inf
     medium: float = np.inf
     friction: float = np.inf
+    onset: float = np.inf
 
 
 NO_DRIVE = (0.0,) * BANDS
@@ -78,7 +80,7 @@ class Usual(NamedTuple):
     """What a healthy rig does at the motion of each sample.
 
     Attributes:
-        extremes: of the residual, infinite where they are not known, shape (4, n).
+        extremes: of the residual, infinite where they are not known, shape (5, n).
         response: deviation of the motion's size from that under the same drive, 1 at its limit, 0
             where the drive was not recorded, shape (n,).
     """
@@ -192,7 +194,9 @@ def _known(limits: HealthyLimits) -> Iterator[Motion]:
     bands = np.reshape(limits.steady_motion_bands or NO_DRIVE * count, (-1, BANDS))
     spectra = limits.steady_paces, limits.steady_sizes, limits.steady_narrow
     shapes = zip(*spectra, drives, strict=True)
-    windows = limits.steady_shorts, limits.steady_mediums, limits.steady_frictions
+    windows = (
+        limits.steady_shorts, limits.steady_mediums, limits.steady_frictions, limits.steady_onsets,
+    )  # fmt: skip
     unknown = (np.inf,) * count
     extremes = zip(limits.steady_energies, *(each or unknown for each in windows), strict=True)
     for shape, largest, own in zip(shapes, extremes, bands, strict=True):
@@ -207,7 +211,7 @@ def _driven(bands: FloatArray, motion: Motion) -> NDArray[np.bool_]:
 
 
 def _no_more(known: Extremes, ratio: FloatArray) -> FloatArray:
-    """Extremes of smaller motions that leave as much, shape (4, n).
+    """Extremes of smaller motions that leave as much, shape (5, n).
 
     They are relative to the healthy variance, which falls at most as the square of the size.
     """
@@ -218,6 +222,7 @@ def _no_more(known: Extremes, ratio: FloatArray) -> FloatArray:
             known.short * energy,
             known.medium * energy,
             known.friction * np.sqrt(energy),
+            known.onset * np.sqrt(energy),
         ]
     )
 

@@ -12,6 +12,7 @@ from monitor.observer.decision_state import (
     ERROR,
     HISTORY,
     LASTING,
+    MEDIUM,
     RISING,
     SPEED,
     SUMS,
@@ -40,6 +41,8 @@ HEAD, FILLED, WAS_JUDGING, LASTED = 0, 1, 12, 13
 """Indices of `decision_state.Counts` as constants for the kernel."""
 BURST = 3.0
 """Largest energy of a sample that counts for a lasting change, relative to the limit."""
+SHORTEST = 4
+"""Fewest samples in which the onset of friction is looked for."""
 RIDGE = 1e-3
 """Correlation of the viscous and the dry regressor above which they cannot be distinguished."""
 
@@ -129,6 +132,30 @@ def friction(
         yy += row[ERROR] * row[ERROR]
     force, viscous, left, both, dry = _solved(a, b, c, p, q, yy, used * spread * spread)
     return force, viscous, force * np.sqrt(left) / spread, both, dry
+
+
+@part()
+def onset_evidence(kept: DecisionState, spread: float) -> float:
+    """Evidence of dry friction that has just begun, in standard deviations; 0 if it would push.
+
+    Of the windows that end now, the largest of the likelihood ratio's root for a force of dry
+    friction alone in them: a test for a change of unknown size at an unknown instant (A. Willsky,
+    H. Jones, IEEE Transactions on Automatic Control 21, 1976). Beside viscous friction, a steady
+    motion leaves a fifth of the evidence. What is not high-passed is the response to a force that
+    begins, as long as the windows are short beside the high-pass.
+
+    Args:
+        kept: the state.
+        spread: of the healthy residual at this motion.
+    """
+    most = a = p = 0.0
+    for ago in range(1, min(MEDIUM, kept.counts[FILLED]) + 1):
+        row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
+        a += row[BARE] * row[BARE]
+        p += row[BARE] * row[ERROR]
+        if ago >= SHORTEST and p > 0.0 and a > 0.0:
+            most = max(most, p * p / a)
+    return np.sqrt(most) / spread
 
 
 @part()

@@ -8,6 +8,7 @@ from monitor.observer.decision_state import DecisionRules, new_state
 from monitor.observer.lagged_motion import FIRST, WHOLE
 from monitor.observer.missing_force import JITTERS, JUDGED, UNSURE_INPUT, E
 from monitor.observer.observer_decision import decide
+from monitor.observer.usual_error import Extremes
 
 N, BEGIN, NOISE = 1536, 1024, 0.15
 RULES = DecisionRules(NOISE, np.zeros(1), 9.0, 5.0, 7.0, 1.0, 0.0, 1.0, 0.0, 256, 192, 1.6**2)
@@ -26,7 +27,7 @@ def departs(read_wrongly: float, fault: float, jitters: float) -> bool:
     zeros, out = np.zeros(N, np.bool_), np.zeros((len(d.OUTPUTS), N))
     decide(
         judged, np.ones(N), np.zeros((N, 1)), np.ones(N), ~zeros, zeros, ~zeros,
-        np.full((4, N), np.inf), np.zeros(N), state, RULES, new_state(1), out,
+        np.full((len(Extremes._fields), N), np.inf), np.zeros(N), state, RULES, new_state(1), out,
     )  # fmt: skip
     assert not out[d.DEPARTED, :BEGIN].any()
     assert out[d.MODE, BEGIN] == d.JUDGING

@@ -124,8 +124,10 @@ def test_another_motion_has_none(frequency: float, size: float) -> None:
 @pytest.mark.parametrize("ratio", [0.7, 0.85])
 def test_a_smaller_motion_of_the_same_kind_leaves_no_more(ratio: float) -> None:
     seen = spectrum(8.0, 0.2 * ratio)
-    windows = {"steady_shorts": (3.0,), "steady_mediums": (2.0,), "steady_frictions": (4.0,)}
-    known = structs.replace(limits(), **windows)
+    known = structs.replace(
+        limits(), steady_shorts=(3.0,), steady_mediums=(2.0,), steady_frictions=(4.0,),
+        steady_onsets=(5.0,),
+    )  # fmt: skip
 
     found = UsualError(known, RATE).update(seen, driven(seen), no_drive(seen)).extremes[:, SETTLED:]
 
@@ -134,6 +136,7 @@ def test_a_smaller_motion_of_the_same_kind_leaves_no_more(ratio: float) -> None:
     np.testing.assert_allclose(found[1], 3.0 * energy, rtol=0.1)
     np.testing.assert_allclose(found[2], 2.0 * energy, rtol=0.1)
     np.testing.assert_allclose(found[3], 4.0 / ratio, rtol=0.1)
+    np.testing.assert_allclose(found[4], 5.0 / ratio, rtol=0.1)
 
 
 def test_a_motion_recorded_at_its_own_size_is_compared_with_that() -> None:
@@ -267,7 +270,7 @@ def without_lasting() -> RigModel:
     bare = structs.replace(
         healthy, steady_paces=(), steady_sizes=(), steady_narrow=(), steady_drives=(),
         steady_energies=(), steady_motion_bands=(),
-        steady_shorts=(), steady_mediums=(), steady_frictions=(),
+        steady_shorts=(), steady_mediums=(), steady_frictions=(), steady_onsets=(),
     )  # fmt: skip
     return structs.replace(model(), healthy=bare)
 

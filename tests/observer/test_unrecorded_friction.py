@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter
 
-from monitor.observer import decide, high_pass, new_state
+from monitor.observer import Extremes, decide, high_pass, new_state
 from monitor.observer import decision_state as d
 from monitor.observer.lagged_motion import FIRST, WHOLE
 from monitor.observer.missing_force import DRY_BARE, DRY_UNIT, JUDGED, VISCOUS_UNIT, WEAK, E
@@ -44,8 +44,8 @@ def watched(missing: FloatArray, speed: FloatArray, driven: FloatArray) -> Float
     state[0] = FIRST
     yes, no, out = np.ones(N, np.bool_), np.zeros(N, np.bool_), np.zeros((len(d.OUTPUTS), N))
     decide(
-        judged, speed, np.zeros((N, 1)), np.ones(N), no, no, yes, np.full((4, N), np.inf),
-        np.zeros(N), state, RULES, new_state(1), out,
+        judged, speed, np.zeros((N, 1)), np.ones(N), no, no, yes,
+        np.full((len(Extremes._fields), N), np.inf), np.zeros(N), state, RULES, new_state(1), out,
     )  # fmt: skip
     assert (out[d.MODE, 512:] == d.BEYOND).all()
     return out

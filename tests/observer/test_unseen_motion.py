@@ -7,7 +7,15 @@ import pytest
 
 from monitor.commissioning.equations.unseen_motion import MOST, unseen_ratio
 from monitor.model import EquationsPlant
-from monitor.observer import E, Observed, ObserverSignals, decide, friction_limit, new_state
+from monitor.observer import (
+    E,
+    Extremes,
+    Observed,
+    ObserverSignals,
+    decide,
+    friction_limit,
+    new_state,
+)
 from monitor.observer import decision_state as d
 from monitor.observer.lagged_motion import FIRST, WHOLE
 from monitor.observer.missing_force import JUDGED, LATE_UNIT
@@ -61,7 +69,8 @@ def test_limits_grow_only_where_the_motion_was_not_recorded(usual: float, ratio:
         out = np.zeros((len(d.OUTPUTS), n))
         decide(
             judged.copy(), np.ones(n), levels, np.ones(n), ~zeros, zeros, ~zeros,
-            np.full((4, n), usual), np.zeros(n), state, rules, new_state(1), out,
+            np.full((len(Extremes._fields), n), usual), np.zeros(n), state, rules, new_state(1),
+            out,
         )  # fmt: skip
         deviations.append(out[d.DEVIATION, -1])
         assert friction_limit(np.array([np.inf, 1.0]), rules)[1] == pytest.approx(1.6)
@@ -89,7 +98,7 @@ def test_a_new_residual_at_a_motion_that_is_known_is_a_departure_at_once(
     rules = RULES._replace(short=2.56, medium=2.56, unseen=1.0)
     decide(
         judged, np.ones(n), levels, np.ones(n), ~zeros, zeros, ~zeros,
-        np.full((4, n), usual), np.zeros(n), state, rules, new_state(1), out,
+        np.full((len(Extremes._fields), n), usual), np.zeros(n), state, rules, new_state(1), out,
     )  # fmt: skip
 
     departed = np.flatnonzero(out[d.DEPARTED])

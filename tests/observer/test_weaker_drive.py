@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from monitor.observer import decide, new_state
+from monitor.observer import Extremes, decide, new_state
 from monitor.observer import decision_state as d
 from monitor.observer.lagged_motion import FIRST, WHOLE
 from monitor.observer.missing_force import DRY_BARE, DRY_UNIT, JUDGED, VISCOUS_UNIT, WEAK, E
@@ -24,8 +24,8 @@ def verdict(residual: np.ndarray, driven: np.ndarray, speed: np.ndarray) -> floa
     state[0] = FIRST
     ones, zeros, out = np.ones(n, np.bool_), np.zeros(n, np.bool_), np.zeros((len(d.OUTPUTS), n))
     decide(
-        judged, speed, np.zeros((n, 1)), np.ones(n), ones, zeros, ones, np.full((4, n), np.inf),
-        np.zeros(n), state, rules, new_state(1), out,
+        judged, speed, np.zeros((n, 1)), np.ones(n), ones, zeros, ones,
+        np.full((len(Extremes._fields), n), np.inf), np.zeros(n), state, rules, new_state(1), out,
     )  # fmt: skip
     return float(out[d.VERDICT, -1])
 

@@ -11,6 +11,7 @@ from monitor.model import HealthyLimits
 from monitor.observer import (
     DEVIATIONS,
     DISAGREE,
+    EVIDENCE,
     LASTING,
     MEASURED,
     MEDIUM,
@@ -118,6 +119,7 @@ def healthy_limits(
         steady_shorts=tuple(motion.extremes.short for motion in steady),
         steady_mediums=tuple(motion.extremes.medium for motion in steady),
         steady_frictions=tuple(motion.extremes.friction for motion in steady),
+        steady_onsets=tuple(motion.extremes.onset for motion in steady),
     )  # fmt: skip
 
 
@@ -128,11 +130,13 @@ def _extremes(part: HealthyPart, rules: DecisionRules, skip: int) -> Extremes:
     error = part.judged[:, E]
     relative = error[skip:] ** 2 / allowed[skip:]
     medium = _largest(error, MEDIUM, allowed, skip)
+    by_chance = CHANCE * float(np.sqrt(medium))
     return Extremes(
         lasting=float(mean_over(relative, min(LASTING, relative.size)).max()),
         short=_largest(error, SHORT, allowed, skip),
         medium=medium,
-        friction=max(float(np.abs(out[DEVIATIONS][skip:]).max()), CHANCE * np.sqrt(medium)),
+        friction=max(float(np.abs(out[DEVIATIONS][skip:]).max()), by_chance),
+        onset=max(float(out[EVIDENCE][skip:].max()), by_chance),
     )
 
 
