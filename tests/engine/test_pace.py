@@ -10,6 +10,7 @@ from rigwatch.physics.engine.compile.step_size import (
     FINEST,
     INSTANT,
     constant_rates,
+    fastest_of,
     pace,
     steps_for,
 )
@@ -164,15 +165,15 @@ def test_a_slow_model_takes_the_steps_asked_for():
     system = motor().system
     names = list(system.parameters)
     at = motor().vector({"L": 0.05, "R": 1.0})
-    assert steps_for(system, constant_rates(system), at, INTERVAL) == 1
+    assert steps_for(fastest_of(system, constant_rates(system), at), INTERVAL) == 1
     at[names.index("L")] = 1e-9
-    assert steps_for(system, constant_rates(system), at, INTERVAL) == FINEST
+    assert steps_for(fastest_of(system, constant_rates(system), at), INTERVAL) == FINEST
 
 
 def test_a_mode_that_is_instantaneous_takes_only_the_steps_in_which_it_decays():
     system, rate = motor().system, 5 * INSTANT
     at = motor().vector({"L": INTERVAL / rate, "J": 1e-3, "K": 0.1, "R": 1.0, "b": 1e-4})
-    steps = steps_for(system, constant_rates(system), at, INTERVAL)
+    steps = steps_for(fastest_of(system, constant_rates(system), at), INTERVAL)
     assert rate / 2 < steps < rate
     fine = discharged(INTERVAL / rate, 512)
     assert discharged(INTERVAL / rate, 1) == pytest.approx(fine, rel=1e-2)

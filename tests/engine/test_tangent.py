@@ -32,3 +32,12 @@ def test_a_state_that_shows_nowhere_is_left_alone():
     found = Tangent(blind, [(np.arange(WINDOWS), ALL)]).solve(VALUES)
     assert np.abs(found[:, 1]).max() < 1e-9
     assert np.isfinite(found).all()
+
+
+def test_states_that_show_alike_are_told_apart_as_far_as_the_samples_allow():
+    alike = SLOPES.copy()
+    alike[..., 2] = alike[..., 1] + 1e-12 * SLOPES[..., 2]
+    found = Tangent(alike, [(np.arange(WINDOWS), ALL)]).solve(VALUES)
+    for w in range(WINDOWS):
+        wanted = np.linalg.lstsq(alike[w], VALUES[w], rcond=1e-10)[0]
+        np.testing.assert_allclose(found[w], wanted, atol=1e-6)

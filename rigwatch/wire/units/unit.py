@@ -252,7 +252,7 @@ def _meant(name: str) -> str:
 
 def times(one: Dimension, other: Dimension, power: Fraction | int = 1) -> Dimension:
     """The dimension of one·otherᵖᵒʷᵉʳ."""
-    return tuple(a + b * power for a, b in zip(one, other, strict=True))
+    return tuple(a + b * power if b else a for a, b in zip(one, other, strict=True))
 
 
 def describe(dim: Dimension) -> str:

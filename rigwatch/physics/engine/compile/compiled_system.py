@@ -1,7 +1,7 @@
 """A system that can be simulated, with exact sensitivities, and linearised along a trajectory."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -71,6 +71,8 @@ class CompiledSystem:
 
     system: System
     kernel: Any
+    _fastest: dict[bytes, float] = field(default_factory=dict, init=False, repr=False)
+    """The fastest rate at the last parameters: most simulations repeat those of the one before."""
 
     @property
     def parameters(self) -> FloatArray:
@@ -111,7 +113,7 @@ class CompiledSystem:
         """
         outputs = np.empty((len(starts), length, len(self.system.outputs)))
         slopes = np.empty((*outputs.shape, self.columns))
-        needed = min(finest, steps_for(self.system, self._rates, parameters, float(np.max(dt))))
+        needed = min(finest, steps_for(self.fastest(parameters), float(np.max(dt))))
         steps = max(substeps, needed)
         arguments = self._arguments(inputs, dt, begins, starts, length, initial, parameters, steps)
         n = len(self.system.states)
@@ -126,7 +128,13 @@ class CompiledSystem:
         Args:
             parameters: all of them, shape (n_p,).
         """
-        return fastest_of(self.system, self._rates, parameters)
+        key = parameters.tobytes()
+        found = self._fastest.get(key)
+        if found is None:
+            found = fastest_of(self.system, self._rates, parameters)
+            self._fastest.clear()
+            self._fastest[key] = found
+        return found
 
     @cached_property
     def _rates(self) -> tuple[sympy.Expr, ...]:

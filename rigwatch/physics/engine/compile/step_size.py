@@ -122,20 +122,16 @@ def constant_rates(system: System) -> tuple[sympy.Expr, ...]:
     return tuple(dict.fromkeys(s for s in slopes if s.free_symbols and s.free_symbols <= known))
 
 
-def steps_for(
-    system: System, rates: tuple[sympy.Expr, ...], parameters: FloatArray, spacing: float
-) -> int:
+def steps_for(fastest: float, spacing: float) -> int:
     """Steps between samples that the model's constant rates need.
 
     Args:
-        system: the equations.
-        rates: its `constant_rates`.
-        parameters: all of them, shape (n_p,).
+        fastest: of these rates, see `fastest_of` [1/s].
         spacing: time between samples [s].
     """
-    fastest = fastest_of(system, rates, parameters) * spacing
-    steps = max(math.ceil(min(fastest / DECAYING, FINEST)), 1)
-    while steps < FINEST and _decay_error(fastest, steps) > DECAY_ERROR:
+    decay = fastest * spacing
+    steps = max(math.ceil(min(decay / DECAYING, FINEST)), 1)
+    while steps < FINEST and _decay_error(decay, steps) > DECAY_ERROR:
         steps += 1
     return steps
 
@@ -144,7 +140,9 @@ def fastest_of(system: System, rates: tuple[sympy.Expr, ...], parameters: FloatA
     """The largest of the model's constant rates; 0 without any [1/s].
 
     Args:
-        system, rates, parameters: as in `steps_for`.
+        system: the equations.
+        rates: its `constant_rates`.
+        parameters: all of them, shape (n_p,).
     """
     if not rates:
         return 0.0

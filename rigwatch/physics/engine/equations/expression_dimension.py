@@ -111,11 +111,11 @@ class _Measurer:
     ) -> Dimension | None:
         return None if one is None else times(one, other or NONE, power)
 
-    def _power(self, node: ast.AST, base: Dimension | None, exponent: ast.AST) -> Dimension | None:
+    def _power(self, node: ast.AST, base: Dimension | None, exponent: ast.expr) -> Dimension | None:
         if base is None or base == NONE:
             return base
         try:
-            return times(NONE, base, Fraction(str(ast.literal_eval(ast.unparse(exponent)))))
+            return times(NONE, base, Fraction(str(ast.literal_eval(exponent))))
         except ValueError:
             raise ModelError(
                 f"{self._where}: found {ast.unparse(node)!r}, expected a number as exponent of"

@@ -2,6 +2,7 @@
 
 import ast
 import warnings
+from functools import lru_cache
 
 from rigwatch.wire.errors import ModelError
 
@@ -12,25 +13,35 @@ DEEPEST, DEEPEST_CALLS = 400, 24
 
 
 def syntax_tree(text: str, where: str) -> ast.expr:
-    """Python's syntax tree of an expression, after checking its length and depth."""
+    """Python's syntax tree of an expression, after checking its length and depth.
+
+    It is shared by all that read the same text.
+    """
     if len(text) > LONGEST:
         found = f"found {len(text)} characters"
         raise ModelError(f"{where}: {found}, expected an expression of at most {LONGEST}")
     try:
-        with warnings.catch_warnings():
-            # Python's remarks on style, such as "2and x", belong to its programs only.
-            warnings.simplefilter("ignore", SyntaxWarning)
-            tree = ast.parse(text.strip(), mode="eval").body
+        tree, deep = _parsed(text)
     except SyntaxError as error:
         raise ModelError(
             f"{where}: found {quoted(text)}, which breaks off at character {error.offset}"
         ) from None
     except (RecursionError, MemoryError, ValueError):
         raise ModelError(f"{where}: found {quoted(text)}, which cannot be read") from None
-    if _is_deep(tree):
+    if deep:
         expected = f"operations at most {DEEPEST} deep, functions {DEEPEST_CALLS}"
         raise ModelError(f"{where}: found {quoted(text)}, expected {expected}")
     return tree
+
+
+@lru_cache(maxsize=1024)
+def _parsed(text: str) -> tuple[ast.expr, bool]:
+    """The tree, and whether it is nested too deeply; each effect is read at every port."""
+    with warnings.catch_warnings():
+        # Python's remarks on style, such as "2and x", belong to its programs only.
+        warnings.simplefilter("ignore", SyntaxWarning)
+        tree = ast.parse(text.strip(), mode="eval").body
+    return tree, _is_deep(tree)
 
 
 def _is_deep(tree: ast.AST) -> bool:

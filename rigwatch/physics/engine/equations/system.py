@@ -7,6 +7,7 @@ applied in sequence, in the order of placement unless they are placed ahead.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import sympy
 from msgspec import structs
@@ -105,7 +106,7 @@ class System:
     updates: Mapping[str, sympy.Expr] = field(default_factory=dict)
     delayed: Mapping[str, Delayed] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def free(self) -> tuple[str, ...]:
         """Names of the free parameters."""
         return tuple(name for name, p in self.parameters.items() if not p.fixed)

@@ -16,10 +16,12 @@ with e the window's error, S = ∂e/∂s, and h⁺ the hidden states at the begi
 """
 
 from dataclasses import replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from rigwatch.physics.engine.compile import CompiledSystem, rate_limit
 from rigwatch.physics.engine.fit import (
@@ -264,6 +266,16 @@ class _ContinuedWindows:
             ) from error
         return unknowns(found.x)
 
+    @cached_property
+    def _turns(self) -> list[tuple[IntArray, NDArray[np.bool_]]]:
+        """Windows that are simulated together, and which of them a window follows."""
+        problem = self._problem
+        firsts, count = problem.first_windows, len(problem.starts)
+        return [
+            (rows, (rows + 1 < count) & ~np.isin(rows + 1, firsts))
+            for rows in [firsts, *problem.window_order]
+        ]
+
     def _bounds(self) -> tuple[FloatArray, FloatArray]:
         """Lower and upper bounds of the unknowns."""
         recordings = len(self._problem.first_windows)
@@ -298,7 +310,7 @@ class _ContinuedWindows:
         turn = np.zeros((count, len(hidden), len(q)))
         turn[firsts] = np.eye(len(q))[m:].reshape(len(firsts), len(hidden), len(q))
         done: list[tuple[IntArray, _Path]] = []
-        for rows in [firsts, *problem.window_order]:
+        for rows, onward in self._turns:
             found = self._windows(parameters, rows, initial[rows], turn[rows])
             if found is None:
                 return None
@@ -306,7 +318,6 @@ class _ContinuedWindows:
             if not _finite(path.residual, path.jacobian, ended, moved):
                 return None
             done.append((rows, path))
-            onward = (rows + 1 < count) & ~np.isin(rows + 1, firsts)
             initial[np.ix_(rows[onward] + 1, hidden)] = ended[onward]
             turn[rows[onward] + 1] = moved[onward]
         order = np.argsort(np.concatenate([rows for rows, _ in done]))
