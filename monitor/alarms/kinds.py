@@ -383,6 +383,15 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         _PASSING,
     ),
     AlarmKind(
+        "drive_late",
+        "info",
+        "the drive acts later (+) or earlier (-) than in commissioning",
+        "Where the generator was started again or replaced, nothing is wrong. Where it was not, "
+        "something has changed that acts like it at this motion, such as mass or stiffness: look "
+        "at another frequency, or explain a recording.",
+        _REMARK,
+    ),
+    AlarmKind(
         "not_observable",
         "info",
         "too little motion to estimate friction; the estimates are frozen",

@@ -29,10 +29,12 @@ UNNAMED, FRICTION, STICKING, OTHER = 0.0, 1.0, 2.0, 3.0
 OUTPUTS = (
     "mode", "deviation", "force", "viscous", "named_force", "share", "dry_share", "rest",
     "verdict", "sensors", "spread", "departed", "amplitude", "deviations", "evidence",
+    "lateness",
 )  # fmt: skip
 (
     MODE, DEVIATION, FORCE, VISCOUS, NAMED_FORCE, SHARE, DRY_SHARE, REST,
     VERDICT, SENSORS, SPREAD, DEPARTED, AMPLITUDE, DEVIATIONS, EVIDENCE,
+    FOUND_LATE,
 ) = range(len(OUTPUTS))  # fmt: skip
 
 USUAL_LASTING, USUAL_SHORT, USUAL_MEDIUM, USUAL_FRICTION, USUAL_ONSET = range(5)

@@ -38,6 +38,7 @@ from monitor.observer.decision_state import (
     ERROR,
     EVIDENCE,
     FORCE,
+    FOUND_LATE,
     FRICTION,
     HISTORY,
     JUDGING,
@@ -81,6 +82,7 @@ from monitor.observer.input_lateness import (
     seems_late,
     seems_to_grow,
     slides,
+    told_lateness,
     unsure_lateness,
 )
 from monitor.observer.lagged_motion import EMPTY, FIRST, TAINTED
@@ -317,7 +319,7 @@ def _one(  # noqa: PLR0917 -- a kernel
     count[OUTSIDE] = 0 if not inside else min(count[OUTSIDE] + 1, LONG)
     out[AMPLITUDE, k] = mean_square(kept, LEVEL, MEDIUM)
     spread = np.sqrt(_variance(kept, rules) + mean_square(kept, UNDECIDED, MEDIUM))
-    out[SPREAD, k] = spread
+    out[SPREAD, k], out[FOUND_LATE, k] = spread, told_lateness(kept.lateness)
     force, viscous, deviations, _, _ = friction(kept, MEDIUM, spread)
     out[FORCE, k], out[VISCOUS, k], out[DEVIATIONS, k] = force, viscous, deviations
     out[REST, k] = rest(kept, LONG, rules.speed_noise)

@@ -229,6 +229,13 @@ class ObserverMonitor:
             above(kinds.ILL_CONDITIONED, never, lost * 0.0, 0.0),
             above(kinds.NOT_ARMED, ~started | (mode == d.ARMING), waited, 0.0),
             above(kinds.NOT_JUDGED, started & (mode == d.BEYOND), far[at:], 1.0),
+            above(
+                kinds.DRIVE_LATE,
+                armed & (kept[d.FOUND_LATE] != 0.0),
+                kept[d.FOUND_LATE],
+                0.0,
+                told="{:+.2g} samples",
+            ),
             above(kinds.GAP, lost != 0.0, lost, 0.0),
             above(kinds.MONITOR_RESET, seen.predicted.reset[at:], lost * 0.0, 0.0),
             above(kinds.SENSOR_INVALID, run > longest, run.astype(np.float64), longest),

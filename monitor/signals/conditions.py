@@ -23,6 +23,7 @@ NOT_OBSERVABLE = "not_observable"
 ILL_CONDITIONED = "ill_conditioned"
 NOT_ARMED = "not_armed"
 NOT_JUDGED = "not_judged"
+DRIVE_LATE = "drive_late"
 GAP = "gap"
 MONITOR_RESET = "monitor_reset"
 SENSOR_INVALID = "sensor_invalid"
@@ -96,6 +97,13 @@ CONDITION_KINDS: tuple[ConditionKind, ...] = (
         "condition number of the normal matrix",
         "1",
         "the two friction terms cannot be told apart, estimates are held",
+        False,
+    ),
+    ConditionKind(
+        DRIVE_LATE,
+        "lateness of the drive behind that of commissioning",
+        "samples",
+        "the drive acts earlier or later than in commissioning, which is allowed for",
         False,
     ),
     ConditionKind(

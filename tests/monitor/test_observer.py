@@ -48,6 +48,21 @@ def test_friction_is_named_in_newtons(drive) -> None:
     assert np.median(force) == pytest.approx(0.6, rel=0.2)
 
 
+def test_a_drive_that_acts_later_is_remarked_on_with_its_lateness() -> None:
+    channels = run(SINE, 6.0, seed=5)
+    assert "drive_late" not in raised(watched(channels))
+    at = np.arange(channels["voltage"].size)
+    channels["voltage"] = np.interp(at + 0.6, at, channels["voltage"])
+
+    found = watched(channels)
+
+    assert not FAULTS & raised(found).keys()
+    remark = next(each for each in found.announcements if each.name == "drive_late")
+    assert remark.severity == "info"
+    assert remark.value == pytest.approx(0.6, abs=0.1)
+    assert remark.cause.endswith("+0.6 samples")
+
+
 def jittering(voltage: np.ndarray) -> np.ndarray:
     """The voltage read before its steps, at half of the samples."""
     late = np.random.default_rng(6).random(voltage.size) < 0.5

@@ -15,6 +15,7 @@ rubs = from_python(input_lateness.rubs)
 seems_late = from_python(input_lateness.seems_late)
 seems_to_grow = from_python(input_lateness.seems_to_grow)
 slides = from_python(input_lateness.slides)
+told_lateness = from_python(input_lateness.told_lateness)
 unsure_lateness = from_python(input_lateness.unsure_lateness)
 
 N, NOISE = 1024, 0.1
@@ -42,6 +43,15 @@ def test_lateness_is_found(tau) -> None:
     assert kept[TAU] == pytest.approx(tau, abs=0.05)
     assert is_late(kept)
     assert not lateness_changes(kept)
+
+
+@pytest.mark.parametrize(("tau", "told"), [(0.0, 0.0), (0.1, 0.0), (0.7, 0.7), (-0.7, -0.7)])
+def test_a_lateness_that_matters_is_told(tau, told) -> None:
+    assert told_lateness(learnt(tau * LATE)) == pytest.approx(told, abs=0.05)
+
+
+def test_one_that_slides_is_not() -> None:
+    assert told_lateness(learnt(np.linspace(-0.2, 0.9, N) * LATE)) == 0.0
 
 
 @pytest.mark.parametrize(("since", "grows"), [(512, True), (16, False), (48, False)])
