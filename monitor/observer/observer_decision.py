@@ -129,9 +129,10 @@ LEFT, LEFT_EARLY = 0.55, 0.8
 windows and over those shorter than `MEDIUM`, which hardly tell the two apart: what grows with the
 speed, as drag, a saturated drive and a lost gain of it do, leaves less.
 """
-LEFT_UNRECORDED, AGREED_UNRECORDED = 0.75, 64
+LEFT_UNSURE, AGREED_UNRECORDED = 0.75, 64
 """The first of these over seconds of a motion that was not recorded, and consecutive samples that
-must agree there: what the equations mispredict of faster or larger motion grows with the speed.
+must agree there: what the equations mispredict of faster or larger motion grows with the speed. So
+does what a lateness of the inputs that is allowed for leaves of another fault.
 """
 OUTDONE, NOISE = 3.0, 0.02
 """Ratio of the energy that friction leaves to that which a weaker drive leaves above which it is
@@ -383,7 +384,7 @@ def _unrecorded(  # noqa: PLR0917 -- a kernel
         count[AGREED] = 0
     add_unrecorded(kept, spread, rules.speed_noise)
     force, beside, share, dry, drive, energy = unrecorded_friction(kept)
-    fits = share > FITS and dry > DRY_PART and beside > LEFT_UNRECORDED * force
+    fits = share > FITS and dry > DRY_PART and beside > LEFT_UNSURE * force
     fits = fits and energy > SURELY_NEW**2 * limit
     # Of a window in which a fault begins, neither explains the part before.
     fits = fits and share > drive and 1.0 - share < OUTDONE * max(1.0 - drive, NOISE)
@@ -492,7 +493,8 @@ def _verdict(
     beside, _, _, share, dry = friction(kept, length, spread)
     force, acting = dry_force(kept, since, length, rules.high_pass)
     out[SHARE, k], out[DRY_SHARE, k] = share, dry
-    least = LEFT_EARLY if length < MEDIUM else LEFT
+    known = LEFT_UNSURE if is_late(kept.lateness) else LEFT
+    least = LEFT_EARLY if length < MEDIUM else known
     fits = share > FITS and dry > DRY_PART and force > 0.0 and beside > least * force
     drive = drive_explains(kept, length, spread)
     fits = fits and 1.0 - share < OUTDONE * max(1.0 - drive, NOISE)

@@ -100,13 +100,6 @@ CONDITION_KINDS: tuple[ConditionKind, ...] = (
         False,
     ),
     ConditionKind(
-        DRIVE_LATE,
-        "lateness of the drive behind that of commissioning",
-        "samples",
-        "the drive acts earlier or later than in commissioning, which is allowed for",
-        False,
-    ),
-    ConditionKind(
         GAP,
         "samples missing before this one",
         "1",
