@@ -171,7 +171,8 @@ def _forces_of_the_motion(x: float, v: float, t: float, e: Record) -> float:
     force = e.quadratic_drag * v * abs(v) + e.cubic_stiffness * x**3
     force += e.quadratic_stiffness * x * x + e.viscous_by_direction * abs(v)
     force += e.van_der_pol * x * x * v - e.constant_force
-    force += e.pulsating_spring * np.sin(2 * np.pi * 0.7 * t) * x
+    if e.pulsating_spring != 0:
+        force += e.pulsating_spring * np.sin(2 * np.pi * 0.7 * t) * x
     force -= e.backlash * _clipped(x, GAP)
     if abs(x) > STOP:
         force += e.hard_stop * (x - np.sign(x) * STOP)
@@ -231,7 +232,9 @@ def _run(
             other = u - STIFFNESS * x - DAMPING * now
             other += _forces_of_the_motion(x, now, (k * STEPS + step) * H, e)
             other += _forces_with_memory(v, e, memory)
-            dry = e.coulomb + e.stribeck * np.exp(-((now / 0.08) ** 2))
+            dry = e.coulomb
+            if e.stribeck != 0:
+                dry += e.stribeck * np.exp(-((now / 0.08) ** 2))
             dry += e.end_binding * (x / 0.1) ** 4
             a, v = _under_friction(v, other, dry)
             if step == 0:

@@ -51,9 +51,9 @@ def strength_at(share: float, caused: Callable[[float], float], least: float = L
         least: smallest strength that is tried.
     """
     low = high = least
-    while caused(high) < share and high < MOST:
+    while (found := caused(high)) < share and high < MOST:
         low, high = high, high * 4
-    if low == high or caused(high) < share:
+    if low == high or found < share:
         return high
 
     def surplus(logarithm: float) -> float:

@@ -32,8 +32,10 @@ def test_a_block_that_fits_is_no_longer_than_foreseen(channels: int) -> None:
     assert 0.7 * MAX_PAYLOAD < len(encode(wide(0, most, channels))) <= MAX_PAYLOAD
 
 
-@pytest.mark.parametrize("apart", [1, 2])
-@pytest.mark.parametrize("channels", [3, 64, 300])
+@pytest.mark.parametrize(
+    ("channels", "apart"),
+    [(3, 1), (3, 2), (64, 1), (64, 2), pytest.param(300, 1, marks=pytest.mark.nightly), (300, 2)],
+)
 def test_a_reply_of_a_ring_fits_the_bus_and_the_next_goes_on(channels: int, apart: int) -> None:
     """Each sample alone, or every other: then each is a block of its own, with all the names."""
     ring, found = RingStore(wide(0, 1, channels), 1500), []

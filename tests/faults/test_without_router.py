@@ -29,6 +29,7 @@ MODEL = Path(__file__).parents[1] / "versions" / "2026-11-22" / "model.toml"
 AT_ONCE = 2.0
 """Time to end, an attempt of the bus and the interpreter's own end included [s]."""
 BOOT = 5
+PROCESSES = ("daq", "monitor", "record", "witness", "dashboard")
 Change = tuple[str, str, int]
 
 
@@ -43,8 +44,19 @@ def alone(folder: Path) -> Path:
     return rig
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=["SIGTERM", "SIGINT"])
-@pytest.mark.parametrize("process", ["daq", "monitor", "record", "witness", "dashboard"])
+@pytest.mark.parametrize(
+    ("process", "number"),
+    [
+        *((process, signal.SIGTERM) for process in PROCESSES),
+        ("record", signal.SIGINT),
+        *(
+            pytest.param(process, signal.SIGINT, marks=pytest.mark.nightly)
+            for process in PROCESSES
+            if process != "record"
+        ),
+    ],
+    ids=lambda value: getattr(value, "name", value),
+)
 def test_a_process_that_waits_for_its_router_ends_at_once(
     process: str, number: signal.Signals, tmp_path: Path
 ) -> None:
@@ -110,7 +122,11 @@ def lost(messages: list[Alarm | Gap] | list[Gap]) -> list[Gap]:
 
 
 @pytest.mark.xdist_group("faults-supervised")
-@pytest.mark.parametrize("dead", [("monitor",), ("monitor", "record")], ids=" and ".join)
+@pytest.mark.parametrize(
+    "dead",
+    [pytest.param(("monitor",), marks=pytest.mark.nightly), ("monitor", "record")],
+    ids=" and ".join,
+)
 def test_62_a_monitor_that_is_killed_while_the_router_is_away(
     rig: Field, dead: tuple[str, ...]
 ) -> None:

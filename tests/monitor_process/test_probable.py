@@ -67,9 +67,17 @@ FAULTS = [
     ("acceleration_lag", 0.006, "lag@acceleration_sensor", 5),
     ("chamber_leak", 0.02, "leakage@chambers", 8),
 ]
+BY_DAY = {"coulomb", "spring", "actuator_gain", "acceleration_lag", "chamber_leak"}
 
 
-@pytest.mark.parametrize(("effect", "value", "name", "most"), FAULTS, ids=[f[0] for f in FAULTS])
+@pytest.mark.parametrize(
+    ("effect", "value", "name", "most"),
+    [
+        # By day one of each kind of port.
+        pytest.param(*fault, id=fault[0], marks=() if fault[0] in BY_DAY else pytest.mark.nightly)
+        for fault in FAULTS
+    ],
+)
 def test_the_fault_stands_in_the_first_class(
     effect: str, value: float, name: str, most: int
 ) -> None:

@@ -21,6 +21,18 @@ RATE = 256
 Floats = NDArray[np.float64]
 
 
+# Members, and the scenarios of one, take seconds to draw: what is the same code for all flavours
+# is tested by day on one of each group.
+FEW_BY_DAY = pytest.mark.parametrize(
+    "member",
+    [
+        pytest.param(name, marks=() if name in {"orifice", "spool"} else pytest.mark.nightly)
+        for name in sorted(FLAVOURS)
+    ],
+    indirect=True,
+    scope="module",
+)
+
 drawn = cache(draw)
 recordings = cache(watch)
 
@@ -125,6 +137,7 @@ def test_voltage_is_held_or_smooth(member: Member):
     assert (inside > 0) == member.flavour.smooth_generator
 
 
+@FEW_BY_DAY
 def test_same_seed_same_samples_and_another_seed_another_rig(member: Member):
     flavour = member.name.rpartition("_")[0]
     again, other = draw(flavour, 1), draw(flavour, 2)
@@ -134,6 +147,7 @@ def test_same_seed_same_samples_and_another_seed_another_rig(member: Member):
     assert again.record == member.record
 
 
+@FEW_BY_DAY
 def test_recordings_have_the_names_and_onsets_of_the_other_rig(member: Member):
     watched, explained = recordings(member), explain(member)
     for name in ("chirp", "multisine", "start_stop_change", "experiment_7", "fault_spring"):

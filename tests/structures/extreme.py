@@ -13,17 +13,17 @@ from rigwatch.structures.records.record import Record
 from sim_plant.structure import simulate, with_noise
 
 FILE = Path(__file__).parents[2] / "configs" / "structures" / "kabe_antenna.toml"
-POSITIONS = [f"x{node}" for node in range(1, 9)]
 
 
 @dataclass
 class Extreme:
-    """The case that was given up in 1999: everything unknown.
+    """The case that was given up in 1999: everything unknown, of the antenna or another structure.
 
     Each node is pushed by six sines; each spring has a cubic coefficient of 10 to 20 % of its
     stiffness per m². Guesses are off by up to 30 %, those of the cubic coefficients are zero.
     """
 
+    file: Path = FILE
     noise: float = 0.0
     force: float = 40.0
     dt: float = 0.01
@@ -32,7 +32,7 @@ class Extreme:
     values: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        random, structure = np.random.default_rng(4), load_structure(FILE)
+        random, structure = np.random.default_rng(4), load_structure(self.file)
         for name, node in structure.nodes.items():
             mass = coefficient(node.mass).value
             size = self.force if mass > 0.5 else 0.01 * self.force
@@ -58,12 +58,13 @@ class Extreme:
         }
 
     def structure(self) -> Structure:
-        """The antenna under these loads."""
+        """The structure under these loads."""
         loads = msgspec.convert(self.loads, dict[str, Load])
-        return msgspec.structs.replace(load_structure(FILE), loads=loads)
+        return msgspec.structs.replace(load_structure(self.file), loads=loads)
 
     def record(self, duration: float = 10.0) -> Record:
         """Positions of all nodes."""
-        made = simulate(FILE, self.dt, duration, loads=self.loads, values=self.values)
-        made = with_noise(made, dict.fromkeys(POSITIONS, self.noise), 1, normal=True)
-        return Record(self.dt, {name: made.columns[name] for name in POSITIONS})
+        made = simulate(self.file, self.dt, duration, loads=self.loads, values=self.values)
+        positions = [f"x{node}" for node in load_structure(self.file).nodes]
+        made = with_noise(made, dict.fromkeys(positions, self.noise), 1, normal=True)
+        return Record(self.dt, {name: made.columns[name] for name in positions})

@@ -14,6 +14,17 @@ from tests.structures.antenna import FILE, FOLDER, antenna, positions
 from tests.structures.extreme import Extreme
 
 FRAME = {"columns": 25.0, "columns_cubic": 2.5, "joints": 1.0, "joints_cubic": 0.1}
+CHAIN = """
+name = "chain"
+summary = "Two masses and three springs in a row."
+[nodes]
+1.mass = 1.0
+2.mass = 1.5
+[springs]
+lower = { between = ["1"], stiffness = 400.0 }
+middle = { between = ["1", "2"], stiffness = 300.0 }
+upper = { between = ["2"], stiffness = 200.0 }
+"""
 NEAR = {"columns": 24.0, "columns_cubic": 2.0, "joints": 0.9, "joints_cubic": 0.08}
 
 
@@ -79,20 +90,30 @@ def test_nowakowskis_pendulum_runs_away_and_is_identified():
         assert found.parameters[name] == pytest.approx(value, rel=1e-3), name
 
 
-def test_everything_unknown_is_identified():
-    case = Extreme()
-    found = identify(
-        "shooting",
-        case.structure(),
-        case.record(6.0),
-        list(case.truth),
-        case.guesses(),
-        partial=True,
-    )
+@pytest.mark.nightly
+def test_everything_unknown_of_the_antenna_is_identified():
+    found, off = everything_identified(Extreme())
     assert len(found.names) == 36
-    off = {name: abs(found.parameters[name] / value - 1) for name, value in case.truth.items()}
     assert max(off[name] for name in found.names if name not in found.undetermined) < 0.01
     assert len(found.undetermined) <= 2
+
+
+def test_everything_unknown_of_a_chain_is_identified(tmp_path):
+    (tmp_path / "chain.toml").write_text(CHAIN)
+    found, off = everything_identified(Extreme(tmp_path / "chain.toml"))
+    assert len(found.names) == 8
+    assert max(off.values()) < 0.01
+    assert not found.undetermined
+
+
+def everything_identified(case):
+    """All coefficients of a structure, and by how much each is off."""
+    found = identify(
+        "shooting", case.structure(), case.record(6.0), list(case.truth), case.guesses(),
+        partial=True,
+    )  # fmt: skip
+    off = {name: abs(found.parameters[name] / value - 1) for name, value in case.truth.items()}
+    return found, off
 
 
 def test_a_light_mass_that_nothing_pushes_is_vague_beside_a_heavy_spring():

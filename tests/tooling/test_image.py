@@ -71,6 +71,7 @@ def recorded_samples(folder: Path) -> int:
     return sum(len(block) for block in open_session(session).samples())
 
 
+@pytest.mark.nightly
 def test_a_rig_runs_and_records_where_python_is_the_only_program(image: Image) -> None:
     folder = image.root.parent / "mounted"
     assert image.run(str(Path(sys.prefix) / "bin" / "python"), "-c", LOOKS_ROUND).strip() == ""

@@ -52,8 +52,13 @@ def test_every_field_is_as_in_the_references(capsys: pytest.CaptureFixture[str])
 
 @pytest.mark.parametrize(
     ("name", "block"),
-    [("friction", 8), ("stiction", 3), ("detectors", 1), ("detectors", 64)]
-    + [("troubled", size) for size in (1, 3, 8, 4096)],
+    [
+        ("friction", 8),
+        ("stiction", 3),
+        pytest.param("detectors", 1, marks=pytest.mark.nightly),
+        ("detectors", 64),
+        *(("troubled", size) for size in (1, 3, 8, 4096)),
+    ],
 )
 def test_the_cut_into_blocks_changes_no_bit(name: str, block: int) -> None:
     assert as_bytes(output(name, block)) == whole(name)

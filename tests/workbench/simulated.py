@@ -1,8 +1,10 @@
 """A simulated mass on a spring with a hidden effect, as an open study in memory."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
@@ -15,6 +17,18 @@ from rigwatch.workbench.study.study_file import Accepted, Span, StudyFile
 from sim_plant.oscillator import DAMPING, MASS, RATE, STIFFNESS, Hidden, oscillate, strength_for
 
 HORIZON = 256
+COMMON = (
+    "coulomb", "viscous", "linear_stiffness", "cubic_stiffness",
+    "dead_band", "saturation", "gain", "offset", "lag", "delay",
+)  # fmt: skip
+"""Effects of loads, drives and sensors: enough for a rule that holds in any library."""
+IN_ANY_LIBRARY = pytest.mark.parametrize(
+    "known",
+    [
+        pytest.param(COMMON, id="common effects"),
+        pytest.param(tuple(library()), id="all effects", marks=pytest.mark.nightly),
+    ],
+)
 
 
 def multisine(lines: FloatArray, size: float, seconds: float = 20.0, seed: int = 4) -> FloatArray:
@@ -55,6 +69,11 @@ def recorded(
 def size_of(force: FloatArray, *, held: bool = False) -> FloatArray:
     """Standard deviation of each output of the healthy plant under a force."""
     return np.asarray(oscillate(force, (), np.zeros(2), 0, held=held).std(axis=0))
+
+
+def knowing(study: Study, *names: str) -> Study:
+    """The study where the library holds no other effects: the fewer, the sooner they are ranked."""
+    return replace(study, effects={name: study.effects[name] for name in names})
 
 
 def study(effects: tuple[Accepted, ...] = ()) -> Study:

@@ -39,7 +39,9 @@ def bench(horizon: int, seed: int) -> Bench:
     return bench_of(motor_study(R, K), Data(train, turned(levels(seed + 3), 3), None, horizon, ()))
 
 
-@pytest.mark.parametrize("seed", [0, 10, 30])
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (10, 30))]
+)
 def test_a_current_that_every_window_begins_anew_is_no_optimum(seed: int) -> None:
     base = bench(20, seed).base
     found = base.train.values()

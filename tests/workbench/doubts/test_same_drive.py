@@ -15,7 +15,15 @@ from rigwatch.workbench.ranking.ranked import Ranked
 from rigwatch.workbench.ranking.same_drive import denied_sensors
 from rigwatch.workbench.study.study_file import Accepted
 from sim_plant.oscillator import RATE, Hidden
-from tests.workbench.simulated import HORIZON, multisine, recorded, size_of, study
+from tests.workbench.simulated import (
+    COMMON,
+    HORIZON,
+    knowing,
+    multisine,
+    recorded,
+    size_of,
+    study,
+)
 
 DRIVE = multisine(np.arange(0.25, 8, 0.25), 4.0, 12.0)
 STRONG = (Hidden("coulomb", 4.0),)
@@ -31,7 +39,8 @@ def data(hidden: tuple[Hidden, ...] = (), drive: FloatArray = DRIVE, gain: float
 
 
 def ranked(of: Data) -> dict[str, Ranked]:
-    bench = bench_of(study(), of, 2e-3 * np.std(of.train.outputs, axis=0))
+    few = knowing(study(), *COMMON)
+    bench = bench_of(few, of, 2e-3 * np.std(of.train.outputs, axis=0))
     return {row.label: row for row in rank(bench.study, bench.data, bench.base, bench.floor)}
 
 

@@ -10,7 +10,7 @@ from tests.workbench.rigs.slides import RAMP, Hidden, bench
 FORCE = 0.8
 
 
-@pytest.mark.parametrize("place", [-0.012, 0.008])
+@pytest.mark.parametrize("place", [pytest.param(-0.012, marks=pytest.mark.nightly), 0.008])
 def test_the_place_where_a_slide_binds_is_found(tmp_path: Path, place: float) -> None:
     rows, verdict = ranking(bench(tmp_path, Hidden(dent=FORCE, place=place)))
 

@@ -34,8 +34,11 @@ def slider_behind(gap: float):
 
 @pytest.mark.parametrize(
     ("gap", "offered"),
-    [(0.003, "jenkins_behind_gap"), (0.0008, "jenkins_behind_gap"), (0.0, None)],
-    ids=["wide", "narrow, for which a drag stands in", "none"],
+    [
+        pytest.param(0.003, "jenkins_behind_gap", id="wide", marks=pytest.mark.nightly),
+        pytest.param(0.0008, "jenkins_behind_gap", id="narrow, for which a drag stands in"),
+        pytest.param(0.0, None, id="none"),
+    ],
 )
 def test_a_slider_that_turns_out_to_be_behind_play_is_offered_in_its_place(
     tmp_path: Path, gap: float, offered: str | None

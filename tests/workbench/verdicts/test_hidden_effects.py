@@ -10,7 +10,15 @@ from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.ranking.ranked import accepted_from
 from rigwatch.workbench.study.study import Study
 from sim_plant.oscillator import UNKNOWN, Hidden, strength_for
-from tests.workbench.simulated import HORIZON, multisine, recorded, size_of, study
+from tests.workbench.simulated import (
+    HORIZON,
+    IN_ANY_LIBRARY,
+    knowing,
+    multisine,
+    recorded,
+    size_of,
+    study,
+)
 
 pytestmark = pytest.mark.long
 
@@ -76,16 +84,19 @@ def test_nothing_is_missing_from_a_healthy_plant() -> None:
     assert bench.floor.ratio(bench.base.held_out) == pytest.approx(1.0, abs=0.1)
 
 
-def test_what_no_known_effect_explains_is_reported_as_unknown() -> None:
-    _, verdict = explained(study(), simulated((UNKNOWN[0],), 0.05))
+@IN_ANY_LIBRARY
+def test_what_no_known_effect_explains_is_reported_as_unknown(known: tuple[str, ...]) -> None:
+    _, verdict = explained(knowing(study(), *known), simulated((UNKNOWN[0],), 0.05))
     assert verdict.word == "unknown_effect"
 
 
-def test_two_hidden_effects_are_named_in_two_steps() -> None:
+@IN_ANY_LIBRARY
+def test_two_hidden_effects_are_named_in_two_steps(known: tuple[str, ...]) -> None:
     data = simulated(("coulomb", "cubic_stiffness"), 0.05)
-    _, first = explained(study(), data)
+    _, first = explained(knowing(study(), *known), data)
     assert first.best is not None
     found = named(first) | set(first.second)
     if not first.second:
-        found |= named(explained(study((accepted_from(first.best),)), data)[1])
+        accepted = (accepted_from(first.best),)
+        found |= named(explained(knowing(study(accepted), *known), data)[1])
     assert {"coulomb@load", "cubic_stiffness@load"} <= found

@@ -16,7 +16,7 @@ from sim_plant.machines import MACHINES, log
 from sim_plant.machines import strength_for as machine_strength
 from sim_plant.oscillator import Hidden, strength_for
 from tests.workbench.machine import studied
-from tests.workbench.simulated import fitted, multisine
+from tests.workbench.simulated import COMMON, fitted, knowing, multisine
 
 pytestmark = pytest.mark.long
 
@@ -84,7 +84,9 @@ def test_two_simple_effects_are_not_taken_for_one_with_a_shape():
 
 
 def test_an_effect_with_a_shape_of_its_own_is_not_taken_for_two_simple_ones():
-    _, verdict = ranking(hiding("stribeck"))
+    bench = hiding("stribeck")
+    few = knowing(bench.study, "stribeck", "quadratic_drag", *COMMON)
+    _, verdict = ranking(dataclasses.replace(bench, study=few))
     assert verdict.word == "missing_effect"
     assert "stribeck@load" in verdict.members
     assert verdict.second == ()
@@ -101,7 +103,8 @@ def test_friction_that_falls_with_speed_is_not_taken_for_dry_friction_and_drag(t
     study = studied(
         tmp_path, model_text("pendulum"), named[:1], named[1:], units, keys, [rate, rate]
     )
-    found, verdict = ranking(open_bench(study))
+    few = knowing(study, "stribeck", "quadratic_drag", *COMMON)
+    found, verdict = ranking(open_bench(few))
     falling = next(row for row in found if row.label == "stribeck@shaft")
     # Alone it explains nearly all, and no other effect resembles it.
     assert falling.accepted
