@@ -54,22 +54,6 @@ def recorded(folder: Path) -> list[int]:
     return numbers(list(open_session(folder).samples()), BOOT)
 
 
-def only_session(rig: Field) -> Path:
-    (folder,) = (rig.folder / "sessions").glob("*Z*")
-    return folder
-
-
-def test_45_a_recorder_that_is_killed(rig: RecordedRig) -> None:
-    began = time.time_ns()
-    rig.start("record")
-    rig.health_after("recorder", began + 2 * 10**9)
-    newest = rig.newest
-    rig.kill("record")
-    kept = recorded(only_session(rig))
-    assert kept == list(range(kept[0], kept[-1] + 1))
-    assert newest - kept[-1] <= RATE, "a second at most"
-
-
 def test_47_a_damaged_session(tmp_path: Path) -> None:
     path = tmp_path / "whole.mcap"
     with SessionWriter(path, run_info("bench", RATE, t_ns=1)) as writer:
@@ -89,6 +73,22 @@ def test_47_a_damaged_session(tmp_path: Path) -> None:
     assert kept == sorted(set(kept))
     assert 512 <= len(kept) < 1920, "sound chunks before and after the flipped bit"
     assert max(np.diff(kept)) > 1
+
+
+def only_session(rig: Field) -> Path:
+    (folder,) = (rig.folder / "sessions").glob("*Z*")
+    return folder
+
+
+def test_45_a_recorder_that_is_killed(rig: RecordedRig) -> None:
+    began = time.time_ns()
+    rig.start("record")
+    rig.health_after("recorder", began + 2 * 10**9)
+    newest = rig.newest
+    rig.kill("record")
+    kept = recorded(only_session(rig))
+    assert kept == list(range(kept[0], kept[-1] + 1))
+    assert newest - kept[-1] <= RATE, "a second at most"
 
 
 class SmallDisk:

@@ -43,6 +43,32 @@ def played(folder: Path, model: RigModel, **edited: np.ndarray) -> Iterator[Fiel
         yield made
 
 
+def test_37_motion_that_cannot_tell_the_frictions_apart(tmp_path: Path) -> None:
+    velocity = MODEL.velocity
+    b, a = velocity_filter(velocity.corner, RATE, velocity.sensor_corner).padded()
+    speed = np.where(np.arange(END) % 32 < 16, 0.2, -0.2)
+    for rig in played(tmp_path, MODEL, acceleration=lfilter(a, b, speed)):
+        alarm = rig.raised("ill_conditioned")
+        assert alarm.value > MODEL.decision.worst_condition == 1e8
+        for name in ("theta1", "theta2"):
+            assert (column(rig, name) == 0.0).all(), "held at what was known before"
+        assert column(rig, "armed")[alarm.seq] == 1.0
+        assert alarm.seq - int(np.argmax(column(rig, "armed"))) <= 8, "with the first estimate"
+
+
+def test_39_a_model_whose_filter_grows_without_limit(tmp_path: Path) -> None:
+    for rig in played(tmp_path, structs.replace(MODEL, plant=RESONANT)):
+        alarm = rig.raised("monitor_reset")
+        modelled = column(rig, "modelled_acceleration")
+        assert np.isfinite(modelled).all()
+        assert np.abs(modelled).max() <= 1e9
+        beyond = np.flatnonzero(np.abs(modelled) > 0.5e9)[0]
+        assert 0 <= alarm.seq - beyond <= RATE, "within a second of leaving the limit"
+        (record,) = [one for one in rig.journalled("monitor_reset") if one.active][:1]
+        assert record.latched
+        assert rig.event("MONITOR RESET")
+
+
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Field]:
     channels = {c.name: c.values.copy() for c in wave(0, END, BOOT, 0).channels}
@@ -77,29 +103,3 @@ def test_38_a_number_that_no_filter_can_hold(rig: Field) -> None:
     assert armed[IMPOSSIBLE - 1] == 1.0
     assert armed[alarm.seq : alarm.seq + 32].max() == 0.0, "it starts anew"
     assert armed[-1] == 1.0
-
-
-def test_37_motion_that_cannot_tell_the_frictions_apart(tmp_path: Path) -> None:
-    velocity = MODEL.velocity
-    b, a = velocity_filter(velocity.corner, RATE, velocity.sensor_corner).padded()
-    speed = np.where(np.arange(END) % 32 < 16, 0.2, -0.2)
-    for rig in played(tmp_path, MODEL, acceleration=lfilter(a, b, speed)):
-        alarm = rig.raised("ill_conditioned")
-        assert alarm.value > MODEL.decision.worst_condition == 1e8
-        for name in ("theta1", "theta2"):
-            assert (column(rig, name) == 0.0).all(), "held at what was known before"
-        assert column(rig, "armed")[alarm.seq] == 1.0
-        assert alarm.seq - int(np.argmax(column(rig, "armed"))) <= 8, "with the first estimate"
-
-
-def test_39_a_model_whose_filter_grows_without_limit(tmp_path: Path) -> None:
-    for rig in played(tmp_path, structs.replace(MODEL, plant=RESONANT)):
-        alarm = rig.raised("monitor_reset")
-        modelled = column(rig, "modelled_acceleration")
-        assert np.isfinite(modelled).all()
-        assert np.abs(modelled).max() <= 1e9
-        beyond = np.flatnonzero(np.abs(modelled) > 0.5e9)[0]
-        assert 0 <= alarm.seq - beyond <= RATE, "within a second of leaving the limit"
-        (record,) = [one for one in rig.journalled("monitor_reset") if one.active][:1]
-        assert record.latched
-        assert rig.event("MONITOR RESET")

@@ -80,6 +80,40 @@ def test_05_frames_with_wrong_checksums(rig: Field, device: SerialDevice) -> Non
     assert counted(rig, "crc_errors") > before
 
 
+# Before the tests that lose more: from the fifth gap in a minute on, all are one alarm.
+def test_35_a_gap_in_the_samples(rig: Field, device: SerialDevice) -> None:
+    rig.cleared("gap")
+    rig.calm(device.device, "gap")
+    ready(rig, device)
+    boot, since = device.device.boot, len(rig.gaps)
+    device.faults.start("lose", 2)
+    short = rig.gap(since)
+    assert short.last - short.first == 1
+    armed = estimated(rig, boot, short.last + 1, short.last + 32, "armed")
+    assert armed.all(), "predicted through"
+    assert rig.raised("gap", after_seq=short.first).seq == short.last + 1
+    residual = estimated(rig, boot, short.last + 1, short.last + 32, "residual")
+    before = estimated(rig, boot, short.first - 64, short.first - 1, "residual")
+    assert np.abs(residual).max() < 4.0 * np.abs(before).max(), "no filter has started anew"
+    rig.cleared("gap")
+    for samples in (3, 60):
+        ready(rig, device)
+        since = len(rig.gaps)
+        device.faults.start("lose", samples)
+        long = rig.gap(since)
+        assert long.last - long.first + 1 == samples
+        alarm = rig.raised("gap", after_seq=long.first)
+        assert alarm.seq == long.last + 1
+        assert not estimated(rig, boot, long.first, long.last).size, "nothing is made up"
+        for column in ("armed", "observable"):
+            anew = estimated(rig, boot, long.last + 1, long.last + 7, column)
+            assert not anew.any(), "filters and window start anew"
+        assert not estimated(rig, boot, long.last + 1, long.last + 32, "armed").any()
+        for name in ("theta1", "theta2", "residual"):
+            assert np.isfinite(estimated(rig, boot, long.last + 1, long.last + 64, name)).all()
+        rig.cleared("gap")
+
+
 @pytest.mark.parametrize("kind", ["drop", "insert"])
 def test_06_dropped_and_inserted_bytes(rig: Field, device: SerialDevice, kind: str) -> None:
     boot, since, first = device.device.boot, len(rig.gaps), device.device.next_seq
@@ -153,40 +187,8 @@ def test_10_a_device_that_pauses_without_counting(rig: Field, device: SerialDevi
     assert not [e for e in rig.events if e.code == "clock_jump" and e.t_ns >= began]
 
 
-def test_35_a_gap_in_the_samples(rig: Field, device: SerialDevice) -> None:
-    rig.calm(device.device, "gap")
-    ready(rig, device)
-    boot, since = device.device.boot, len(rig.gaps)
-    device.faults.start("lose", 2)
-    short = rig.gap(since)
-    assert short.last - short.first == 1
-    armed = estimated(rig, boot, short.last + 1, short.last + 32, "armed")
-    assert armed.all(), "predicted through"
-    assert rig.raised("gap", after_seq=short.first).seq == short.last + 1
-    residual = estimated(rig, boot, short.last + 1, short.last + 32, "residual")
-    before = estimated(rig, boot, short.first - 64, short.first - 1, "residual")
-    assert np.abs(residual).max() < 4.0 * np.abs(before).max(), "no filter has started anew"
-    rig.cleared("gap")
-    for samples in (3, 60):
-        ready(rig, device)
-        since = len(rig.gaps)
-        device.faults.start("lose", samples)
-        long = rig.gap(since)
-        assert long.last - long.first + 1 == samples
-        alarm = rig.raised("gap", after_seq=long.first)
-        assert alarm.seq == long.last + 1
-        assert not estimated(rig, boot, long.first, long.last).size, "nothing is made up"
-        for column in ("armed", "observable"):
-            anew = estimated(rig, boot, long.last + 1, long.last + 7, column)
-            assert not anew.any(), "filters and window start anew"
-        assert not estimated(rig, boot, long.last + 1, long.last + 32, "armed").any()
-        for name in ("theta1", "theta2", "residual"):
-            assert np.isfinite(estimated(rig, boot, long.last + 1, long.last + 64, name)).all()
-        rig.cleared("gap")
-
-
 def ready(rig: Field, device: SerialDevice) -> None:
-    """The monitor has its reference again, and no gap stands: gaps of a minute are one alarm."""
+    """The monitor has its reference again."""
     boot = device.device.boot
 
     def armed() -> bool:
@@ -194,7 +196,6 @@ def ready(rig: Field, device: SerialDevice) -> None:
         return last.boot == boot and last.column("armed").values[-1] == 1.0
 
     eventually(armed, "armed")
-    rig.cleared("gap")
 
 
 def test_13_a_signal_at_its_rail(rig: Field, device: SerialDevice) -> None:

@@ -48,17 +48,12 @@ def wired(folder: Path, source: WaveSource, keys: dict[str, str]) -> Iterator[tu
         yield made, device.device.boot
 
 
-@pytest.fixture(scope="module")
-def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Field, int]]:
-    yield from wired(tmp_path_factory.mktemp("wired"), SwappedSource(), {})
-
-
-def test_14_swapped_channels(rig: tuple[Field, int]) -> None:
-    field, boot = rig
-    alarm = field.raised("wiring_swapped")
-    first = min(block.seq for block in field.estimates() if block.boot == boot)
-    assert alarm.seq - first <= 5 * RATE
-    nothing_is_judged(field, boot, alarm.seq)
+def test_14_swapped_channels(tmp_path: Path) -> None:
+    for field, boot in wired(tmp_path, SwappedSource(), {}):
+        alarm = field.raised("wiring_swapped")
+        first = min(block.seq for block in field.estimates() if block.boot == boot)
+        assert alarm.seq - first <= 5 * RATE
+        nothing_is_judged(field, boot, alarm.seq)
 
 
 def nothing_is_judged(field: Field, boot: int, since: int) -> None:
@@ -68,43 +63,6 @@ def nothing_is_judged(field: Field, boot: int, since: int) -> None:
     assert all(block.column("armed").values.max() == 0.0 for block in found)
     assert field.journalled("departure") == []
     assert field.journalled("reference_learnt") == []
-
-
-@pytest.fixture(scope="module")
-def amplified(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Field, int]]:
-    # The voltage's range is a thousandth of what the channel delivers.
-    keys = {"voltage": f"low = -0.002\nhigh = {1000 * GAINS['voltage']!r}"}
-    yield from wired(tmp_path_factory.mktemp("amplified"), AmplifiedSource(), keys)
-
-
-def test_15_a_wrong_unit(amplified: tuple[Field, int]) -> None:
-    field, boot = amplified
-    scale = field.raised("wiring_scale")
-    first = min(block.seq for block in field.estimates() if block.boot == boot)
-    assert scale.value == pytest.approx(4.0, rel=0.05)
-    assert scale.seq - first <= 2 * RATE, "two windows of motion"
-    saturated = field.raised("sensor_saturated.voltage")
-    assert saturated.seq - first <= RATE
-    nothing_is_judged(field, boot, scale.seq)
-
-
-def test_15_a_range_that_cannot_be(amplified: tuple[Field, int]) -> None:
-    field, boot = amplified
-
-    def told() -> float:
-        """From the first sample of this daq to its event [s]."""
-        began = field.started_ns["daq"]
-        event = field.event("implausible", began)
-        text = "channel voltage is mostly outside of its range: wrong unit"
-        assert text in event.text
-        stamps = np.concatenate([b.t_ns for b in field.estimates() if b.boot == boot])
-        return float(event.t_ns - stamps[stamps > began].min()) * 1e-9
-
-    def again() -> None:
-        field.kill("daq")
-        field.start("daq")
-
-    least_of(told, 1.0, again)
 
 
 def test_15_a_drive_in_the_wrong_unit(tmp_path: Path) -> None:
@@ -156,3 +114,40 @@ def armed_after(field: Field, boot: int, seq: int) -> int:
     """Samples from a number on that were used for a verdict."""
     found = [block for block in field.estimates() if block.boot == boot and block.seq >= seq]
     return int(sum(block.column("armed").values.sum() for block in found))
+
+
+@pytest.fixture(scope="module")
+def amplified(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Field, int]]:
+    # The voltage's range is a thousandth of what the channel delivers.
+    keys = {"voltage": f"low = -0.002\nhigh = {1000 * GAINS['voltage']!r}"}
+    yield from wired(tmp_path_factory.mktemp("amplified"), AmplifiedSource(), keys)
+
+
+def test_15_a_wrong_unit(amplified: tuple[Field, int]) -> None:
+    field, boot = amplified
+    scale = field.raised("wiring_scale")
+    first = min(block.seq for block in field.estimates() if block.boot == boot)
+    assert scale.value == pytest.approx(4.0, rel=0.05)
+    assert scale.seq - first <= 2 * RATE, "two windows of motion"
+    saturated = field.raised("sensor_saturated.voltage")
+    assert saturated.seq - first <= RATE
+    nothing_is_judged(field, boot, scale.seq)
+
+
+def test_15_a_range_that_cannot_be(amplified: tuple[Field, int]) -> None:
+    field, boot = amplified
+
+    def told() -> float:
+        """From the first sample of this daq to its event [s]."""
+        began = field.started_ns["daq"]
+        event = field.event("implausible", began)
+        text = "channel voltage is mostly outside of its range: wrong unit"
+        assert text in event.text
+        stamps = np.concatenate([b.t_ns for b in field.estimates() if b.boot == boot])
+        return float(event.t_ns - stamps[stamps > began].min()) * 1e-9
+
+    def again() -> None:
+        field.kill("daq")
+        field.start("daq")
+
+    least_of(told, 1.0, again)

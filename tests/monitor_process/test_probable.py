@@ -2,7 +2,9 @@
 
 import re
 from collections.abc import Iterable
+from copy import deepcopy
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +40,12 @@ ONSET, SECONDS, RATE = 5.0, 7.5, 256
 
 
 def evidence(effect: str = "", value: float = 0.0, seed: int = 3) -> Evidence:
-    """The simulated rig with a fault from ONSET on, as the monitor judges it."""
+    """The simulated rig with a fault from ONSET on, as the monitor judges it; to be changed."""
+    return deepcopy(_evidence(effect, value, seed))
+
+
+@cache
+def _evidence(effect: str, value: float, seed: int) -> Evidence:
     healthy = load_scenario(SCENARIOS / "experiment_2.toml").healthy(SECONDS)
     faults = (Fault(at_s=ONSET, effect=effect, value=value),) if effect else ()
     samples = concatenate(list(simulate(structs.replace(healthy, events=faults), seed=seed)))

@@ -90,14 +90,19 @@ def test_undamaged_records_alarm_nobody(kabe: Structure, noise: float) -> None:
         assert found.watches[0].alarm is None
 
 
-def test_identified_figures_do_not_raise_false_alarms(kabe: Structure) -> None:
+# With 5 % a record, more than one of four has a chance of 1.4 %, more than two of eight of 0.6 %.
+@pytest.mark.parametrize(
+    ("records", "most"), [(4, 1), pytest.param(8, 2, marks=pytest.mark.nightly)]
+)
+def test_identified_figures_do_not_raise_false_alarms(
+    kabe: Structure, records: int, most: int
+) -> None:
     made, alarms = simulate(KABE, 0.01, 10.0), 0
-    for seed in range(8):
+    for seed in range(records):
         noisy = with_noise(made, dict.fromkeys(SIGNALS, 0.05), seed, normal=True)
         found = examine(kabe, positions(noisy.columns, SIGNALS), Settings(rate=0.05))
         alarms += found.watches[0].alarm is not None
-    # With 5 % a record, more than two of eight have a chance of 0.6 %.
-    assert alarms <= 2
+    assert alarms <= most
 
 
 def test_damages_in_sequence_are_found_one_after_the_other(kabe: Structure) -> None:
@@ -130,7 +135,7 @@ def frame_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 # The same examples at every run: one that fails can be looked at.
-@settings(max_examples=6, deadline=None, derandomize=True)
+@settings(max_examples=3, deadline=None, derandomize=True)
 @example(spring="lower", share=0.9, time=6.0)
 @example(spring="top", share=0.9, time=6.0)
 @example(spring="top", share=0.3, time=3.0)

@@ -8,6 +8,7 @@ from rigwatch.workbench.compare.preparation import bench_of
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.ranking import rank
 from tests.workbench.motors import motor_study
+from tests.workbench.simulated import COMMON, knowing
 
 STEP, EVERY, CLIPPED = 5e-5, 80, 7.0
 K, R, L, J, B, PUSHED, PULLED = 0.045, 1.2, 0.9e-3, 5.5e-5, 1.5e-5, 0.009, 0.006
@@ -45,7 +46,7 @@ def swinging(samples: int, lines: tuple[float, ...], seed: int) -> np.ndarray:
 
 @pytest.mark.parametrize("seed", [5, pytest.param(6, marks=pytest.mark.nightly)])
 def test_a_sensor_that_clips_does_not_stand_in_for_a_drive_that_does(seed: int) -> None:
-    study = motor_study(R, K)
+    study = knowing(motor_study(R, K), *COMMON)
     train = [stepped(2400, seed), swinging(2400, (0.23, 0.7, 1.7), seed)]
     held_out = swinging(2400, (0.4, 1.1, 2.1), seed + 10)
     made = joined([driven(volts, index) for index, volts in enumerate(train)])

@@ -21,6 +21,7 @@ from rigwatch.workbench.fit.learned_terms import LEARNED, with_friction, with_pr
 from rigwatch.workbench.study.study import Study
 from tests.workbench.black_box import TEMPLATE, study
 from tests.workbench.black_box import record as multisine
+from tests.workbench.simulated import COMMON, knowing
 
 pytestmark = pytest.mark.long
 
@@ -69,7 +70,8 @@ def test_friction_is_named_in_newtons_under_an_excitation_that_was_not_learned(
     opened = recorded(tmp_path, coulomb=0.5)
     _, driven = along_motion(opened, prepare(opened))
     of, data, scale = taught
-    rows, verdict = ranking(bench_of(of, replace(driven, horizon=data.horizon), scale))
+    bench = bench_of(knowing(of, *COMMON), replace(driven, horizon=data.horizon), scale)
+    rows, verdict = ranking(bench)
     assert verdict.word == "missing_effect"
     best = next(row for row in rows if row.label == "coulomb@load")
     assert best.label in verdict.members

@@ -16,6 +16,7 @@ from rigwatch.workbench.steps import Logs, add, study_from_logs
 from rigwatch.workbench.study import Study, open_study
 from sim_plant.machines import MACHINES, log, strength_for
 from sim_plant.machines.loggers import logged
+from tests.workbench.simulated import COMMON, knowing
 
 KNOWN = {
     "cascade": {"A1": 0.0031, "A2": 0.0026},
@@ -28,7 +29,7 @@ def test_a_hidden_level_does_not_run_on_through_inputs_that_were_lost(tmp_path: 
     # 15 lost rows are a minute, as long as the tank's time constant: the level after them is not
     # what an interpolated pump gives, and no effect describes the difference.
     study = made(tmp_path, "cascade", 0.02, 1001, "lost", late_pump=0.3)
-    bench = open_bench(study)
+    bench = open_bench(knowing(study, *COMMON))
     assert bench.data.train.breaks
     verdict = ranking(bench)[1]
     assert verdict.word == "missing_effect"

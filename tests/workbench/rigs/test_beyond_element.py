@@ -17,6 +17,7 @@ from rigwatch.workbench.ranking.series_order import order_matters
 from rigwatch.workbench.study.study import Study, open_study
 from tests.workbench.fits.test_strength_intervals import MODEL, PERIOD, RATE, drive
 from tests.workbench.machine import Table, recorded, studied
+from tests.workbench.simulated import COMMON, knowing
 
 DRIVEN = MODEL.replace("w*(g*u - q)", "w*(g*drive - q)") + (
     '[ports.drive]\nkind = "actuator"\nsignal = "u"\n'
@@ -79,7 +80,7 @@ def test_the_side_of_the_play_on_which_a_dead_zone_lies_is_found_and_kept(
     tmp_path: Path, before: float, behind: float, side: str
 ) -> None:
     study = study_of(tmp_path, before, behind)
-    found = explained(open_bench(study))
+    found = explained(open_bench(knowing(study, "valve_hysteresis", *COMMON)))
     best = found.explanation.ranking[0]
     assert found.explanation.verdict == "missing_effect", found.explanation.text
     assert (best.effect, best.port) == ("dead_band", "drive")

@@ -15,6 +15,7 @@ from rigwatch.workbench.study.elements import elements_of
 from rigwatch.workbench.study.study import Study, open_study
 from tests.workbench.fits.test_strength_intervals import MODEL, RATE, slide
 from tests.workbench.machine import Table, recorded, studied
+from tests.workbench.simulated import COMMON, knowing
 
 UNITS = {"u": "N", "position": "m", "acceleration": "m/s^2"}
 HEALTHY, FAULT = 0.5, 0.25
@@ -43,7 +44,7 @@ def rubbing(folder: Path, healthy: float) -> Study:
     recorded(folder / "healthy.mcap", table(2, healthy), UNITS, RATE)
     with (made.folder / "study.toml").open("a") as file:
         file.write('\n[[healthy]]\nsession = "../healthy.mcap"\n')
-    return open_study(made.folder)
+    return knowing(open_study(made.folder), *COMMON)
 
 
 def test_more_friction_is_named_beside_what_the_healthy_slide_has(study: Study) -> None:

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ variables.v = { expression = "v", unit = "m/s" }
 """
 
 
+@cache
 def run(seed: int) -> dict[str, np.ndarray]:
     """A mass with drag, by Euler steps of a tenth of a sample."""
     time = np.arange(1500) / RATE
@@ -107,14 +109,23 @@ def test_the_steps_are_those_of_the_commands(
     assert [json.loads(line)["step"] for line in lines] == ["new", "add", "undo"]
 
 
+@pytest.fixture(scope="module")
+def plain_error(tmp_path_factory: pytest.TempPathFactory) -> float:
+    """The held-out error of the study of plain arrays."""
+    folder = tmp_path_factory.mktemp("plain")
+    (folder / "slide.toml").write_text(MODEL)
+    data = {"one": run(1), "two": run(2)}
+    study = rigwatch.Study.new(folder / "study", model=str(folder / "slide.toml"), data=data)
+    return float(study.compare().found.held_out_error)
+
+
 @pytest.mark.parametrize("kind", [dict, as_pandas, as_polars, as_xarray, as_times])
-def test_a_table_of_any_kind_becomes_the_same_study(tmp_path: Path, model: str, kind: Any) -> None:
-    plain = rigwatch.Study.new(tmp_path / "plain", model=model, data={"one": run(1), "two": run(2)})
+def test_a_table_of_any_kind_becomes_the_same_study(
+    tmp_path: Path, model: str, plain_error: float, kind: Any
+) -> None:
     data = {"one": kind(run(1)), "two": kind(run(2))}
     study = rigwatch.Study.new(tmp_path / "study", model=model, data=data)
-    assert study.compare().found.held_out_error == pytest.approx(
-        plain.compare().found.held_out_error, rel=1e-6
-    )
+    assert study.compare().found.held_out_error == pytest.approx(plain_error, rel=1e-6)
 
 
 def test_from_arrays_to_the_missing_effect_and_back_to_data_frames(

@@ -61,5 +61,5 @@ def _inverse(triangle: FloatArray) -> FloatArray:
     # The condition is at most the product of the Frobenius norms.
     squares = np.sum(triangle**2, axis=(1, 2)) * np.sum(inverse**2, axis=(1, 2))
     if (squares < NEGLIGIBLE**-2).all():
-        return inverse
+        return np.asarray(inverse)
     return np.asarray(np.linalg.pinv(triangle, rcond=NEGLIGIBLE))
