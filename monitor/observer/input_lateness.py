@@ -139,8 +139,10 @@ def is_late(kept: FloatArray) -> bool:
 @part()
 def told_lateness(kept: FloatArray) -> float:
     """The lateness for people [samples]: one that has mattered for a while and stays; else 0."""
+    if kept[AGO] > 0.0:
+        return 0.0
     stays = abs(_best(kept, OF_QUICK) - _best(kept, OF_SLOW)) <= GROWTH
-    return kept[TAU] if kept[AGO] == 0.0 and stays else 0.0
+    return kept[TAU] if stays else 0.0
 
 
 @part()

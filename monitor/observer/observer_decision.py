@@ -319,7 +319,9 @@ def _one(  # noqa: PLR0917 -- a kernel
     count[SINCE_START] += 1
     count[OUTSIDE] = 0 if not inside else min(count[OUTSIDE] + 1, LONG)
     out[AMPLITUDE, k] = mean_square(kept, LEVEL, MEDIUM)
-    spread = np.sqrt(_variance(kept, rules) + mean_square(kept, UNDECIDED, MEDIUM))
+    late, open_edges = mean_square(kept, LATENESS, MEDIUM), mean_square(kept, UNDECIDED, MEDIUM)
+    exact = late + open_edges == 0.0
+    spread = np.sqrt(_healthy_variance(kept, rules) + late + open_edges)
     out[SPREAD, k], out[FOUND_LATE, k] = spread, told_lateness(kept.lateness)
     force, viscous, deviations, _, _ = friction(kept, MEDIUM, spread)
     out[FORCE, k], out[VISCOUS, k], out[DEVIATIONS, k] = force, viscous, deviations
@@ -337,7 +339,6 @@ def _one(  # noqa: PLR0917 -- a kernel
     largest = max(np.sqrt(short), np.sqrt(medium), deviations / allowed)
     lasting = lasting_energy(kept, spread**2 * usual[USUAL_LASTING] * margin)
     out[EVIDENCE, k] = onset_evidence(kept, spread)
-    exact = mean_square(kept, LATENESS, MEDIUM) + mean_square(kept, UNDECIDED, MEDIUM) == 0.0
     onset = out[EVIDENCE, k] / (usual[USUAL_ONSET] * np.sqrt(margin))
     if not exact or count[GAP_AGO] < LONG:
         onset = 0.0
@@ -412,12 +413,6 @@ def _sure(deviation: float, known: float, onset: float, kept: DecisionState) -> 
         return kept.counts[ABOVE] >= MEDIUM and rubs(kept.lateness)
     new = known > SURELY_NEW or onset > 1.0
     return deviation > SURE or (new and not seems_late(kept.lateness))
-
-
-@part()
-def _variance(kept: DecisionState, rules: DecisionRules) -> float:
-    """Healthy variance of the residual in the medium window."""
-    return _healthy_variance(kept, rules) + mean_square(kept, LATENESS, MEDIUM)
 
 
 @part()

@@ -98,17 +98,20 @@ def test_installed_alone_it_finds_what_its_commands_need(installed: Path, tmp_pa
     (tmp_path / "line.toml").write_text(LINE)
     (tmp_path / "own.toml").write_text(STUDY)
 
-    modes, _, _, explained, copied = run(
+    _, modes, _, _, compared, explained, copied = run(
         installed,
         tmp_path,
+        "plant healthy_sine_8hz_1v5 --session a.mcap --seconds 4",
         "structure modes shear_frame",
         "import run.csv run.mcap --time t[s] --map v=v[m/s] --map f=f[N]",
         "study new own --template own.toml",
+        "compare own",
         "explain own --json",
         "init mine",
     )
 
     assert "most to suspect" in modes
+    assert "held out" in compared
     assert "coulomb" in explained
     assert "files copied" in copied
     assert (tmp_path / "mine" / "configs" / "demo.toml").is_file()

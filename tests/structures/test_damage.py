@@ -135,7 +135,7 @@ def frame_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 # The same examples at every run: one that fails can be looked at.
-@settings(max_examples=3, deadline=None, derandomize=True)
+@settings(max_examples=6, deadline=None, derandomize=True)
 @example(spring="lower", share=0.9, time=6.0)
 @example(spring="top", share=0.9, time=6.0)
 @example(spring="top", share=0.3, time=3.0)

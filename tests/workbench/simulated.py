@@ -76,6 +76,11 @@ def knowing(study: Study, *names: str) -> Study:
     return replace(study, effects={name: study.effects[name] for name in names})
 
 
+def with_few_effects(bench: Bench, *more: str) -> Bench:
+    """The bench where the library holds the common effects and these."""
+    return replace(bench, study=knowing(bench.study, *more, *COMMON))
+
+
 def study(effects: tuple[Accepted, ...] = ()) -> Study:
     """A mass-spring-damper that is to be fitted; its recordings are given to it."""
     span = (Span(session="simulated"),)

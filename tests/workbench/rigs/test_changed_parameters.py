@@ -5,12 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.explain.changed_parameters import undetermined_if_parameters_changed
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.ranking import no_progress
 from tests.workbench.rigs.slides import Hidden, bench
-from tests.workbench.simulated import COMMON, knowing
+from tests.workbench.simulated import with_few_effects
 from tests.workbench.verdicts.test_refinements import MODEL
 
 DRIVEN = (
@@ -27,13 +26,8 @@ signal = "u"
 )
 
 
-def known(made: Bench) -> Bench:
-    """The same with few effects."""
-    return replace(made, study=knowing(made.study, *COMMON))
-
-
 def test_a_slower_motor_is_no_weaker_one(tmp_path: Path) -> None:
-    slower = known(bench(tmp_path, Hidden(slower=0.15), DRIVEN))
+    slower = with_few_effects(bench(tmp_path, Hidden(slower=0.15), DRIVEN))
     rows, verdict = ranking(slower)
     named = replace(verdict, word="missing_effect")
     assert rows[0].label == "gain@drive"
@@ -52,7 +46,7 @@ def test_an_effect_that_leaves_nothing_is_named(
     tmp_path: Path, weaker: float, rubbing: float, label: str
 ) -> None:
     made = bench(tmp_path, Hidden(weaker=weaker, dry=rubbing), DRIVEN)
-    rows, verdict = ranking(known(made))
+    rows, verdict = ranking(with_few_effects(made))
 
     assert verdict.word == "missing_effect", verdict.text
     assert rows[0].label == label

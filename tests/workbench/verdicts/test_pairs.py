@@ -14,7 +14,7 @@ from rigwatch.workbench.ranking.rank import rank
 from rigwatch.workbench.ranking.ranked import SIMILAR, Ranked
 from rigwatch.workbench.ranking.refitting import no_progress
 from sim_plant.oscillator import Hidden, strength_for
-from tests.workbench.simulated import COMMON, fitted, knowing, multisine
+from tests.workbench.simulated import fitted, multisine, with_few_effects
 
 FORCE = multisine(np.arange(0.25, 8.0, 0.25), 1.0)
 PAIR = ("coulomb@load", "cubic_stiffness@load")
@@ -24,8 +24,7 @@ PAIR = ("coulomb@load", "cubic_stiffness@load")
 def bench():
     share = 0.05 / np.sqrt(2)
     hidden = tuple(Hidden(n, strength_for(n, FORCE, share)) for n in ("coulomb", "cubic_stiffness"))
-    made = fitted(FORCE, hidden, 2e-3)
-    return dataclasses.replace(made, study=knowing(made.study, *COMMON))
+    return with_few_effects(fitted(FORCE, hidden, 2e-3))
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from sim_plant.machines import MACHINES, log
 from sim_plant.machines import strength_for as machine_strength
 from sim_plant.oscillator import Hidden, strength_for
 from tests.workbench.machine import studied
-from tests.workbench.simulated import COMMON, fitted, knowing, multisine
+from tests.workbench.simulated import COMMON, fitted, knowing, multisine, with_few_effects
 
 pytestmark = pytest.mark.long
 
@@ -84,9 +84,7 @@ def test_two_simple_effects_are_not_taken_for_one_with_a_shape():
 
 
 def test_an_effect_with_a_shape_of_its_own_is_not_taken_for_two_simple_ones():
-    bench = hiding("stribeck")
-    few = knowing(bench.study, "stribeck", "quadratic_drag", *COMMON)
-    _, verdict = ranking(dataclasses.replace(bench, study=few))
+    _, verdict = ranking(with_few_effects(hiding("stribeck"), "stribeck", "quadratic_drag"))
     assert verdict.word == "missing_effect"
     assert "stribeck@load" in verdict.members
     assert verdict.second == ()

@@ -4,6 +4,7 @@ Let S = Q·R be the derivatives of a window's error by its initial state. An err
 by the change R⁺Qᵀv of the state; the remainder is v − Q·Qᵀv.
 """
 
+import contextlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -54,12 +55,10 @@ def _split(slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _inverse(triangle: FloatArray) -> FloatArray:
     """The pseudo-inverse; where no state is unobservable the inverse, in a fraction of the time."""
-    try:
+    with contextlib.suppress(np.linalg.LinAlgError):
         inverse = np.linalg.inv(triangle)
-    except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.pinv(triangle, rcond=NEGLIGIBLE))
-    # The condition is at most the product of the Frobenius norms.
-    squares = np.sum(triangle**2, axis=(1, 2)) * np.sum(inverse**2, axis=(1, 2))
-    if (squares < NEGLIGIBLE**-2).all():
-        return np.asarray(inverse)
+        # The condition is at most the product of the Frobenius norms.
+        squares = np.sum(triangle**2, axis=(1, 2)) * np.sum(inverse**2, axis=(1, 2))
+        if (squares < NEGLIGIBLE**-2).all():
+            return np.asarray(inverse)
     return np.asarray(np.linalg.pinv(triangle, rcond=NEGLIGIBLE))

@@ -21,7 +21,6 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from rigwatch.physics.engine.compile import CompiledSystem, rate_limit
 from rigwatch.physics.engine.fit import (
@@ -42,7 +41,7 @@ from rigwatch.physics.engine.fit import (
     result_of,
 )
 from rigwatch.physics.engine.search.hidden_states import has_hidden_states
-from rigwatch.wire.arrays import FloatArray, IntArray
+from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
 
 CONVERGED = 1e-6
@@ -267,7 +266,7 @@ class _ContinuedWindows:
         return unknowns(found.x)
 
     @cached_property
-    def _turns(self) -> list[tuple[IntArray, NDArray[np.bool_]]]:
+    def _turns(self) -> list[tuple[IntArray, BoolArray]]:
         """Windows that are simulated together, and which of them a window follows."""
         problem = self._problem
         firsts, count = problem.first_windows, len(problem.starts)
