@@ -239,12 +239,14 @@ def _rivals(best: Suspect, rows: Sequence[Suspect]) -> str:
     kin = {row.label for row in rows if (row.family, row.port) == (best.family, best.port)}
     named, more = best.alike[:6], len(best.alike) - 6
     listed = ", ".join(named) + (f" and {more} more" if more > 0 else "")
-    verb = "explains" if len(best.alike) == 1 else "explain"
+    one = len(best.alike) == 1
+    verb = "explains" if one else "explain"
     if not best.family or not kin.issuperset(best.alike):
         return f"; {listed} {verb} as much in this motion, so check these too"
+    other = "another law of it" if one else "other laws of it"
     return (
-        f"; {best.family} at {best.port} is settled, by which law is not: "
-        f"{listed} {verb} as much, and neither alarm nor action depends on it"
+        f"; {best.family} at {best.port} is settled, by which law is not: {listed}, {other}, "
+        f"{verb} as much, and neither alarm nor action depends on the law"
     )
 
 

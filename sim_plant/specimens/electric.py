@@ -1,4 +1,4 @@
-"""A winding in terms of flux, and a motor that drives a load through a shaft, in momenta."""
+"""Windings in terms of flux, and what motors and a coil in a magnet's gap move, in momenta."""
 
 import math
 from collections.abc import Callable
@@ -119,4 +119,52 @@ def spin(inputs: FloatArray, dt: float, hidden: str) -> FloatArray:
             volt = between(inputs, k, step / STEPS)[0]
             flux += h * (volt - (1.0 + cable) * current - TORQUE * speed)
             turning += h * (TORQUE * current - FRICTION * speed)
+    return read
+
+
+GAP_STEPS = 96
+"""Between two samples: the coil's current settles within few of them."""
+TONES = np.array([7.0, 19.0, 41.0, 83.0, 151.0, 290.0])
+"""[Hz]."""
+COIL, OWN, IRON, SHARED = 5.0, 4e-3, 3e-3, 2e-3
+"""[ohm]; inductances of the coil, of the currents in the iron around it, and mutual [H]."""
+IN_IRON = 6.0
+"""[ohm]."""
+STRENGTH, MOVING, SUSPENSION, DAMPING = 7.0, 0.02, 1800.0, 1.2
+"""[N/A], [kg], [N/m], [N s/m]."""
+
+FACTORS: dict[str, Callable[[float], float]] = {
+    "gain_along_travel": lambda x: STRENGTH * math.exp(-x / 0.05),
+    "gain_towards_ends": lambda x: STRENGTH / (1 + (x / 0.012) ** 2),
+}
+"""Position [m] → force of the coil per current."""
+
+
+def amplified(time: FloatArray, seed: int) -> FloatArray:
+    """Voltage of a coil [V]."""
+    return sines(time, TONES, 8.0, seed)[:, None]
+
+
+def shake(inputs: FloatArray, dt: float, hidden: str) -> FloatArray:
+    """Travel [m] and current [A] of a coil in the gap of a magnet, shape (n, 2).
+
+    Currents in the iron are those of a second winding, which is shorted.
+    """
+    shared = SHARED if hidden == "eddy_currents" else 0.0
+    apart = OWN * IRON - shared * shared
+    flux, ring, x, pushed, h = 0.0, 0.0, 0.0, 0.0, dt / GAP_STEPS
+    read = np.empty((len(inputs), 2))
+    for k in range(len(inputs)):
+        for step in range(GAP_STEPS):
+            amp = (IRON * flux - shared * ring) / apart
+            induced = (OWN * ring - shared * flux) / apart
+            if step == 0:
+                read[k] = x, amp
+            factor = FACTORS[hidden](x) if hidden in FACTORS else STRENGTH
+            speed = pushed / MOVING
+            volt = between(inputs, k, (step + 0.5) / GAP_STEPS)[0]
+            flux += h * (volt - COIL * amp - factor * speed)
+            ring -= h * IN_IRON * induced
+            pushed += h * (factor * amp - DAMPING * speed - SUSPENSION * x)
+            x += h * pushed / MOVING
     return read

@@ -12,6 +12,7 @@ _TANKS = Machine("tanks", 1.0, flow_and_seal.pumped, flow_and_seal.drain)
 _SEAL = Machine("pneumatic-seal", 50.0, flow_and_seal.stroked, flow_and_seal.pull)
 _ARMATURE = Machine("motor", 256.0, electric.armature, electric.spin)
 _MOTOR = Machine("two-mass-drive", 256.0, electric.amps, electric.turn_load)
+_COIL = Machine("voice-coil", 2048.0, electric.amplified, electric.shake)
 
 KNOWN = dict.fromkeys(("coulomb_by_direction", "position_dependent"), ("coulomb@load",))
 """Effects that the model has already where the hidden one says how they differ from place to place
@@ -49,6 +50,8 @@ HIDDEN: dict[str, Specimen] = {
         (_SEAL, {n: (f"{n}@seal",) for n in ("viscous", "linear_stiffness")}),
         (_ARMATURE, {"series_resistance": ("series_resistance@drive",)}),
         (_MOTOR, {n: (f"{n}@drive",) for n in electric.PUSHES}),
+        (_COIL, {n: (f"{n}@magnet",) for n in electric.FACTORS}),
+        (_COIL, {"eddy_currents": ("eddy_currents@coil",)}),
     )
     for name, named in effects.items()
 }  # fmt: skip

@@ -121,6 +121,7 @@ def test_rivals_of_one_family_leave_the_kind_of_fault_without_doubt() -> None:
     elsewhere = replace(law, port="valve")
     settled = in_words([replace(best, alike=(law.label,)), law])
     assert "dry friction at load is settled, by which law is not: bliman_sorine_2@load" in settled
+    assert "bliman_sorine_2@load, another law of it, explains as much" in settled
     assert "cannot be told" not in settled
     for other in (leak, elsewhere):
         both = replace(best, alike=(law.label, other.label))
