@@ -12,6 +12,9 @@ gathers over months: half a megabyte to one. Only a collection of the old object
 
 Python's own arenas, a megabyte each, are full after start-up: a passing need of some kilobytes
 takes another one, which fills over weeks and stays. Its room is taken at the start instead.
+
+Pieces that are freed between others stay with the process as well: the library gives back only what
+is free at the end of a pool, unless it is asked for all pages that hold nothing.
 """
 
 import contextlib
@@ -34,9 +37,13 @@ TIDY_EVERY = 60.0
 """Time between two collections of everything [s]; with few new objects one takes under 1 ms."""
 
 
+_NO_GLIBC = (AttributeError, OSError, TypeError)
+"""What calling the C library raises where it is not glibc."""
+
+
 def use_few_pools() -> None:
     """Set this up before threads are started; without effect where the library is not glibc."""
-    with contextlib.suppress(AttributeError, OSError, TypeError):
+    with contextlib.suppress(*_NO_GLIBC):
         mallopt = ctypes.CDLL(None).mallopt
         for option, value in (
             (_ARENA_MAX, POOLS),
@@ -59,7 +66,7 @@ def settle_memory() -> None:
 
 
 def keep_memory_tidy(stop: threading.Event) -> None:
-    """Settle the memory, then collect everything once a minute until `stop` is set.
+    """Settle the memory, then collect garbage and empty pages once a minute until `stop` is set.
 
     For processes in which a pause of a millisecond does not matter; in a thread of its own.
     """
@@ -70,3 +77,5 @@ def keep_memory_tidy(stop: threading.Event) -> None:
 def _tidy(stop: threading.Event) -> None:
     while not stop.wait(TIDY_EVERY):
         gc.collect()
+        with contextlib.suppress(*_NO_GLIBC):
+            ctypes.CDLL(None).malloc_trim(0)
