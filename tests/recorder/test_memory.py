@@ -207,3 +207,35 @@ def test_pages_between_what_is_kept_are_given_back() -> None:
     most_kb, kept_kb, _ = map(int, said.stdout.split())
     assert most_kb > 9_000
     assert kept_kb < most_kb / 4
+
+
+ARRAYS_OF_ALL_LENGTHS = """
+import ctypes
+import numpy as np
+from rigwatch.wire.host import settle_memory
+
+class Pools(ctypes.Structure):
+    names = "arena", "free", "fast", "maps", "mapped", "most", "held", "used", "unused", "top"
+    _fields_ = [(name, ctypes.c_size_t) for name in names]
+
+library = ctypes.CDLL(None)
+library.mallinfo2.restype = Pools
+settle_memory()
+before = library.mallinfo2().used
+for length in range(1, 128):
+    needed = [np.ones(length) for _ in range(7)]
+    needed = [np.ones(length, np.uint8) for _ in range(7)]
+print((library.mallinfo2().used - before) // 1000)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="pools are those of glibc")
+def test_arrays_of_new_lengths_find_what_numpy_keeps() -> None:
+    said = subprocess.run(
+        [sys.executable, "-c", ARRAYS_OF_ALL_LENGTHS],
+        check=True,
+        timeout=60,
+        capture_output=True,
+        text=True,
+    )
+    assert int(said.stdout) < 50
