@@ -43,6 +43,15 @@ def test_a_layout_in_use_is_kept_while_others_come_and_go() -> None:
         assert packed.layout_of(EstimateBlock, usual) is layout
 
 
+def test_layouts_of_all_lengths_have_the_names_of_one() -> None:
+    columns = tuple(Column(f"column{k}", "N", np.zeros(9)) for k in range(20))
+    block = EstimateBlock("rig", 7, 0, np.arange(9), columns)
+    one, other = (packed.layout_of(EstimateBlock, encode(cut(block, 0, n))) for n in (3, 9))
+    assert one is not other
+    assert one.names is other.names
+    assert one.plain_names is other.plain_names
+
+
 def test_what_is_not_asked_for_again_makes_room() -> None:
     recent: Recent[int, str] = Recent(most=4, room=100)
     for key in range(50):

@@ -173,3 +173,69 @@ def test_what_is_needed_for_a_moment_finds_room_that_is_there() -> None:
     grown_kb, needed_kb = map(int, said.stdout.split())
     assert needed_kb > 400
     assert grown_kb < needed_kb / 4
+
+
+FREED_BETWEEN_OTHERS = """
+import os, threading, time
+from rigwatch.wire.host import few_pools
+from tools.memory_series import memory_kb
+
+few_pools.TIDY_EVERY = 0.2
+few_pools.use_few_pools()
+few_pools.keep_memory_tidy(threading.Event())
+before = memory_kb(os.getpid())
+needed = [bytes(20_000) for _ in range(500)]
+between = [bytes(1_000) for _ in range(4)]
+most = memory_kb(os.getpid()) - before
+needed.clear()
+end = time.monotonic() + 10.0
+while memory_kb(os.getpid()) - before > most / 4 and time.monotonic() < end:
+    time.sleep(0.05)
+print(round(most), round(memory_kb(os.getpid()) - before), len(between))
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="memory is read from /proc")
+def test_pages_between_what_is_kept_are_given_back() -> None:
+    said = subprocess.run(
+        [sys.executable, "-c", FREED_BETWEEN_OTHERS],
+        check=True,
+        timeout=60,
+        capture_output=True,
+        text=True,
+    )
+    most_kb, kept_kb, _ = map(int, said.stdout.split())
+    assert most_kb > 9_000
+    assert kept_kb < most_kb / 4
+
+
+ARRAYS_OF_ALL_LENGTHS = """
+import ctypes
+import numpy as np
+from rigwatch.wire.host import settle_memory
+
+class Pools(ctypes.Structure):
+    names = "arena", "free", "fast", "maps", "mapped", "most", "held", "used", "unused", "top"
+    _fields_ = [(name, ctypes.c_size_t) for name in names]
+
+library = ctypes.CDLL(None)
+library.mallinfo2.restype = Pools
+settle_memory()
+before = library.mallinfo2().used
+for length in range(1, 128):
+    needed = [np.ones(length) for _ in range(7)]
+    needed = [np.ones(length, np.uint8) for _ in range(7)]
+print((library.mallinfo2().used - before) // 1000)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="pools are those of glibc")
+def test_arrays_of_new_lengths_find_what_numpy_keeps() -> None:
+    said = subprocess.run(
+        [sys.executable, "-c", ARRAYS_OF_ALL_LENGTHS],
+        check=True,
+        timeout=60,
+        capture_output=True,
+        text=True,
+    )
+    assert int(said.stdout) < 50

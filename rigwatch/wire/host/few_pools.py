@@ -12,12 +12,21 @@ gathers over months: half a megabyte to one. Only a collection of the old object
 
 Python's own arenas, a megabyte each, are full after start-up: a passing need of some kilobytes
 takes another one, which fills over weeks and stays. Its room is taken at the start instead.
+
+Numpy keeps up to seven freed arrays of each size below a kilobyte, 3 MB in all. Blocks of ever new
+lengths come for months, and each leaves some: short ones, and those of numbers, are made at the
+start.
+
+Pieces that are freed between others stay with the process as well: the library gives back only what
+is free at the end of a pool, unless it is asked for all pages that hold nothing.
 """
 
 import contextlib
 import ctypes
 import gc
 import threading
+
+import numpy as np
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8
 """Options of mallopt(3)."""
@@ -28,15 +37,19 @@ ROOM, SMALL = 1 << 20, 460
 """Room in Python's arenas beyond what start-up needs, and the objects that take it for a moment, of
 the largest kind that arenas hold [bytes].
 """
+ARRAYS, OF_EACH = (*range(1, 512), *range(512, 1024, 8)), 7
+"""Sizes of arrays that numpy keeps, of flags or numbers of eight bytes [bytes]; number of each."""
 _kept: list[bytes] = []
 """One of them: an arena without any would be given back."""
 TIDY_EVERY = 60.0
 """Time between two collections of everything [s]; with few new objects one takes under 1 ms."""
+_NO_GLIBC = (AttributeError, OSError, TypeError)
+"""What calling the C library raises where it is not glibc."""
 
 
 def use_few_pools() -> None:
     """Set this up before threads are started; without effect where the library is not glibc."""
-    with contextlib.suppress(AttributeError, OSError, TypeError):
+    with contextlib.suppress(*_NO_GLIBC):
         mallopt = ctypes.CDLL(None).mallopt
         for option, value in (
             (_ARENA_MAX, POOLS),
@@ -55,11 +68,13 @@ def settle_memory() -> None:
     gc.collect()
     if not _kept:
         _kept.append([bytes(SMALL) for _ in range(ROOM // SMALL)][-1])
+        for size in ARRAYS:
+            _made = [np.ones(size, np.uint8) for _ in range(OF_EACH)]
     gc.freeze()
 
 
 def keep_memory_tidy(stop: threading.Event) -> None:
-    """Settle the memory, then collect everything once a minute until `stop` is set.
+    """Settle the memory, then collect garbage and empty pages once a minute until `stop` is set.
 
     For processes in which a pause of a millisecond does not matter; in a thread of its own.
     """
@@ -70,3 +85,5 @@ def keep_memory_tidy(stop: threading.Event) -> None:
 def _tidy(stop: threading.Event) -> None:
     while not stop.wait(TIDY_EVERY):
         gc.collect()
+        with contextlib.suppress(*_NO_GLIBC):
+            ctypes.CDLL(None).malloc_trim(0)

@@ -13,9 +13,13 @@ _EIGHT = 8
 """Size of a time or value [bytes]."""
 NUMBERS_KEPT = 512
 """Numbers whose bytes are remembered: a boot comes with each of its blocks."""
+NAMES_KEPT = 32
+"""Sets of names that layouts share."""
 _LONGEST_NUMBER = 9
 """Bytes of a number of 63 bits, the longest that `Layout.first_numbers` reads."""
 Span = tuple[int, int]
+Names = tuple[tuple[str, str, bool], ...]
+"""Name and unit of each column, and whether it has quality."""
 
 
 class UnfamiliarError(Exception):
@@ -41,7 +45,8 @@ class Layout:
         device: offsets of the device's name, None for an empty one.
         boot, seq: offsets of these numbers, None for 0.
         times: offsets of its integer arrays.
-        fixed: all other bytes, each part with its offset.
+        parts: all other bytes, in order.
+        starts: the offset of each part.
     """
 
     samples: int
@@ -50,30 +55,30 @@ class Layout:
     seq: Span | None
     times: tuple[int, ...]
     columns: tuple[ColumnPlace, ...]
-    fixed: tuple[tuple[int, bytes], ...]
+    parts: tuple[bytes, ...]
+    starts: tuple[int, ...]
 
     @cached_property
-    def fixed_parts(self) -> tuple[struct.Struct, tuple[bytes, ...]]:
-        """Takes the parts of `fixed` from a block of equal length in one call, and what they are.
+    def reader(self) -> struct.Struct:
+        """Takes what stands in place of `parts` from a block of equal length in one call.
 
         A look at each of forty parts takes three times as long.
         """
         form, at = [], 0
-        for start, part in self.fixed:
+        for start, part in zip(self.starts, self.parts, strict=True):
             form.append(f"{start - at}x{len(part)}s")
             at = start + len(part)
-        return struct.Struct("".join(form)), tuple([part for _, part in self.fixed])
+        return struct.Struct("".join(form))
 
     @cached_property
-    def names(self) -> tuple[tuple[str, str, bool], ...]:
+    def names(self) -> Names:
         """Name and unit of each column, and whether it has quality."""
-        return tuple((place.name, place.unit, place.quality >= 0) for place in self.columns)
+        return _same(tuple((place.name, place.unit, place.quality >= 0) for place in self.columns))
 
     @cached_property
     def plain_names(self) -> tuple[tuple[str, str], ...]:
         """Name and unit of each column; none if one has quality."""
-        judged = any(place.quality >= 0 for place in self.columns)
-        return () if judged else tuple((place.name, place.unit) for place in self.columns)
+        return _plain(self.names)
 
     @cached_property
     def words(self) -> NDArray[np.intp]:
@@ -90,7 +95,8 @@ class Layout:
     @cached_property
     def shared(self) -> NDArray[np.intp]:
         """Offsets of all bytes that blocks of one boot share: those but `seq` and the arrays."""
-        spans = [(start, start + len(part)) for start, part in self.fixed]
+        fixed = zip(self.starts, self.parts, strict=True)
+        spans = [(start, start + len(part)) for start, part in fixed]
         spans += [span for span in (self.device, self.boot) if span is not None]
         return np.concatenate([np.arange(*span) for span in spans])
 
@@ -120,6 +126,18 @@ class Layout:
         device = "" if self.device is None else data[slice(*self.device)].decode()
         boot = 0 if self.boot is None else integer(data, self.boot)
         return device, boot, 0 if self.seq is None else integer(data, self.seq)
+
+
+@lru_cache(maxsize=NAMES_KEPT)
+def _same(names: Names) -> Names:
+    """The first of equal names: layouts of many lengths have those of few kinds of blocks."""
+    return names
+
+
+@lru_cache(maxsize=NAMES_KEPT)
+def _plain(names: Names) -> tuple[tuple[str, str], ...]:
+    judged = any(quality for _, _, quality in names)
+    return () if judged else tuple((name, unit) for name, unit, _ in names)
 
 
 def varint(data: bytes, at: int) -> tuple[int, int]:

@@ -84,8 +84,7 @@ def _fits(layout: Layout, data: bytes) -> bool:
     for span in (layout.boot, layout.seq):
         if span is not None and filling(data[span[0] : span[1]]) is None:
             return False
-    reader, parts = layout.fixed_parts
-    return reader.unpack(data) == parts
+    return layout.reader.unpack(data) == layout.parts
 
 
 def _read(kind: type[K], layout: Layout, data: bytes) -> K:
@@ -125,7 +124,7 @@ def _layout(kind: type[Any], data: bytes) -> Layout:
         seq,
         tuple(start for start, _ in times),
         tuple(columns),
-        _between(data, sorted(variable)),
+        *_between(data, sorted(variable)),
     )
 
 
@@ -140,10 +139,11 @@ def _column(data: bytes, span: Span, n: int) -> ColumnPlace:
     return ColumnPlace(name, unit, values[0], quality[0])
 
 
-def _between(data: bytes, variable: list[Span]) -> tuple[tuple[int, bytes], ...]:
-    starts = [0, *(stop for _, stop in variable)]
-    stops = [*(start for start, _ in variable), len(data)]
-    return tuple((a, data[a:b]) for a, b in zip(starts, stops, strict=True))
+def _between(data: bytes, variable: list[Span]) -> tuple[tuple[bytes, ...], tuple[int, ...]]:
+    """The parts of `data` around these spans, and where each begins."""
+    starts = (0, *(stop for _, stop in variable))
+    stops = (*(start for start, _ in variable), len(data))
+    return tuple(data[a:b] for a, b in zip(starts, stops, strict=True)), starts
 
 
 def _fields(data: bytes, within: Span, tags: Set[int]) -> dict[int, list[Span]]:
