@@ -40,13 +40,15 @@ KINDS = {
 QUIET = {
     "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
     "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "1s",
+    "DASK_DISTRIBUTED__ADMIN__SYSTEM_MONITOR__INTERVAL": "10s",
     "MALLOC_TRIM_THRESHOLD_": str(64 << 20),
     "MALLOC_MMAP_THRESHOLD_": str(32 << 20),
 }
 """Settings of a worker that neither samples its own stack, a hundred times a second, nor looks
-whether its event loop turns, fifty times: each takes the interpreter from the work. Memory that is
-freed it keeps, up to where the C library goes by itself; Dask's own setting gives back each 64 kB,
-which the kernel must fill with zeros again, two hundred pages for a recording of ten seconds.
+whether its event loop turns, fifty times: each takes the interpreter from the work. It looks at
+the machine's network and disks every ten seconds, not twice a second. Memory that is freed it
+keeps, up to where the C library goes by itself; Dask's own setting gives back each 64 kB, which the
+kernel must fill with zeros again, two hundred pages for a recording of ten seconds.
 """
 
 

@@ -55,7 +55,7 @@ def expand(given: Iterable[Path | str], inside: Finder = recording_at) -> list[s
         inside: units of a folder.
 
     Raises:
-        BatchError: a path does not exist, or a glob or a folder holds nothing.
+        BatchError: a path does not exist, a glob or a folder holds nothing, or a name is not UTF-8.
     """
     found: dict[str, str] = {}
     resolved: dict[str, str] = {}
@@ -69,7 +69,17 @@ def expand(given: Iterable[Path | str], inside: Finder = recording_at) -> list[s
     if not found:
         names = ", ".join(map(str, given)) or "no path"
         raise BatchError(f"{names}: found nothing to work on, expected recordings or studies")
+    for unit in found.values():
+        _check_name(unit)
     return sorted(found.values())
+
+
+def _check_name(unit: str) -> None:
+    """Raise if no file of results can hold the unit's path."""
+    try:
+        unit.encode()
+    except UnicodeEncodeError:
+        raise BatchError(f"{unit}: found a name that is not UTF-8, expected one that is") from None
 
 
 def _resolved(unit: str, folders: dict[str, str]) -> str:

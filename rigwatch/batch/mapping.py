@@ -16,7 +16,7 @@ import msgspec
 from rigwatch.batch.drive import RETRIES, Drive
 from rigwatch.batch.executors import Maker, preload
 from rigwatch.batch.expand import Finder, expand, recording_at
-from rigwatch.batch.job import Job, Outcome, job_of, run_units
+from rigwatch.batch.job import Job, Outcome, job_of, pack, run_units
 from rigwatch.batch.journal import Journal, check_target, read_outcomes
 from rigwatch.batch.pool import Pool
 from rigwatch.batch.progress import Progress
@@ -166,5 +166,5 @@ def _pool(job: Job, executor: Executor | Maker | None) -> Iterator[Pool]:
     pool.close()
 
 
-def _run(job: Job, settings: dict[str, Any], paths: tuple[str, ...], _label: str) -> list[Outcome]:
-    return run_units(job, settings, paths, __version__)
+def _run(job: Job, settings: dict[str, Any], paths: tuple[str, ...], _label: str) -> bytes:
+    return pack(run_units(job, settings, paths, __version__))

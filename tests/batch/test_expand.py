@@ -1,5 +1,8 @@
 """Paths, globs and folders as units."""
 
+import os
+from pathlib import Path
+
 import pytest
 
 from rigwatch.batch import expand, recording_at
@@ -40,3 +43,9 @@ def test_what_is_not_there_is_reported(tmp_path):
         expand([tmp_path / "none.mcap"])
     with pytest.raises(BatchError, match="found nothing to work on"):
         expand([tmp_path, f"{tmp_path}/*.mcap"])
+
+
+def test_a_name_that_no_file_of_results_can_hold_is_refused(tmp_path):
+    Path(os.fsdecode(bytes(tmp_path) + b"/odd\xff.mcap")).touch()
+    with pytest.raises(BatchError, match=r"odd\udcff.mcap: found a name that is not UTF-8"):
+        expand([tmp_path])

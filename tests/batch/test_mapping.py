@@ -15,6 +15,7 @@ import pytest
 import rigwatch
 from rigwatch.batch import Outcome, executor_on
 from rigwatch.batch.drive import LARGEST_TASK, RETRIES, SHORTEST_TASK_S, Drive
+from rigwatch.batch.job import pack
 from rigwatch.batch.pool import Pool
 from rigwatch.wire.errors import BatchError
 from tests.batch.jobs import ROOT, counted, make_files, sizes
@@ -192,12 +193,36 @@ def test_what_answers_and_is_no_scheduler_is_not_awaited_for_ever(monkeypatch):
         web.shutdown()
 
 
+class Kept(ThreadPoolExecutor):
+    """Keeps what its workers answered."""
+
+    def __init__(self) -> None:
+        super().__init__(1)
+        self.futures = []
+
+    def submit(self, *call):
+        self.futures.append(super().submit(*call))
+        return self.futures[-1]
+
+
+def test_dask_sends_the_outcomes_of_a_task_in_one_piece_however_many_they_are(files):
+    from distributed.protocol import dumps, to_serialize
+
+    with Kept() as executor:
+        rigwatch.map(sizes, [files], executor=executor)
+    answers = [future.result() for future in executor.futures]
+    assert len(answers) < COUNT
+    assert {len(dumps({"answer": to_serialize(answer)})) for answer in answers} == {
+        len(dumps({"answer": to_serialize(b"any")}))
+    }
+
+
 def test_short_units_go_in_long_tasks_and_at_the_end_in_shorter_ones_that_are_worth_it():
     lengths, each_s = [], 0.002
 
     def run(paths, _label):
         lengths.append(len(paths))
-        return [Outcome(path, "", b"1", seconds=each_s) for path in paths]
+        return pack([Outcome(path, "", b"1", seconds=each_s) for path in paths])
 
     units = [f"{number:05d}" for number in range(5000)]
     found = Drive(Pool(None), run, units, RETRIES, lambda _: None)

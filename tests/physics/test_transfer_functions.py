@@ -130,3 +130,11 @@ def test_velocity_has_no_lead(frequency: float) -> None:
 def test_a_bias_of_the_accelerometer_does_not_become_a_velocity() -> None:
     settled = velocity_filter(0.5, RATE, 0.5).simulate(np.ones(8000))
     assert abs(settled[-1]) < 1e-9
+
+
+def test_a_velocity_filter_is_made_once_and_nobody_can_change_it_for_the_others() -> None:
+    function = velocity_filter(0.5, RATE, 0.3)
+    assert velocity_filter(0.5, RATE, 0.3) is function
+    for shared in (function.b, function.a):
+        with pytest.raises(ValueError, match="read-only"):
+            shared[0] = 0.0

@@ -165,6 +165,17 @@ def test_a_folder_is_read_as_one_session(tmp_path: Path) -> None:
     assert same(block, samples(0, 300))
 
 
+def test_opening_a_session_reads_its_description_which_is_not_searched_again(
+    tmp_path: Path,
+) -> None:
+    run = run_info("bench1", 256.0, t_ns=T0)
+    with SessionWriter(tmp_path / "a.mcap", run):
+        pass
+    session = open_session(tmp_path / "a.mcap")
+    (tmp_path / "a.mcap").unlink()
+    assert session.info == run
+
+
 def test_an_existing_file_is_not_overwritten(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     path.write_text("precious")

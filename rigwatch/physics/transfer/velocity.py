@@ -14,6 +14,7 @@ transform makes the integrator trapezoidal; its pole is cancelled, so there is n
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -21,10 +22,11 @@ from rigwatch.physics.transfer.transfer_function import TransferFunction
 from rigwatch.wire.arrays import FloatArray
 
 
+@lru_cache(maxsize=16)
 def velocity_filter(
     corner: float, sample_rate: float, sensor_corner: float = 0.0, compensate_lead: bool = True
 ) -> TransferFunction:
-    """Acceleration [m/s^2] to velocity [m/s].
+    """Acceleration [m/s^2] to velocity [m/s]; remembered, as many monitors run with one model.
 
     Args:
         corner: corner of the high-pass [Hz].
@@ -36,7 +38,10 @@ def velocity_filter(
     lead = 2.0 * c + p if compensate_lead else 0.0
     b = _bilinear([0.0, 1.0, lead, 0.0], sample_rate)
     a = _bilinear([1.0, 2.0 * c, 2.0 * c**2, c**3], sample_rate)
-    return TransferFunction.of(b / a[0], a / a[0])
+    found = TransferFunction.of(b / a[0], a / a[0])
+    for shared in (found.b, found.a):
+        shared.flags.writeable = False
+    return found
 
 
 def _bilinear(coefficients: Sequence[float], sample_rate: float) -> FloatArray:

@@ -11,6 +11,7 @@ All intact data are delivered, every checksum is verified, and unreadable parts 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import Any, cast
 
@@ -108,6 +109,7 @@ class Session:
         self.path, self.segments = path, segments
         self._lost: dict[tuple[int, int], LostSpan] = {}
         self._index: tuple[int, FileIndex] | None = None
+        self._opening: tuple[tuple[Topic, bytes], ...] = ()
 
     @property
     def lost(self) -> tuple[LostSpan, ...]:
@@ -126,12 +128,18 @@ class Session:
         Raises:
             SessionError: no segment has one.
         """
-        # It comes first: a look at the index would cost more than the search.
+        # It comes first, so it mostly was seen when the session was opened. A look at the index
+        # would cost more than the search.
+        for line, data in chain(self._opening, self._searched()):
+            if line.message is RunInfo:
+                return cast(RunInfo, self._decode(line, data))
+        raise SessionError(f"{self.path}: the description of the run (RunInfo) is lost")
+
+    def _searched(self) -> Iterator[tuple[Topic, bytes]]:
+        """Topic and bytes of every message of all segments."""
         for index in range(len(self.segments)):
             for line, _, data in self._scanned(index):
-                if line.message is RunInfo:
-                    return cast(RunInfo, self._decode(line, data))
-        raise SessionError(f"{self.path}: the description of the run (RunInfo) is lost")
+                yield line, data
 
     def may_hold(self, name: str) -> bool:
         """False only if every segment is closed and reports no message of topic `name`.
@@ -148,7 +156,8 @@ class Session:
         """Raise if the session holds no message of rigwatch."""
         foreign: set[str] = set()
         for index in range(len(self.segments)):
-            for _ in self._records(index, foreign):
+            for line, _, data in self._records(index, foreign):
+                self._opening = ((line, data),)
                 return
         reason = f"its topics are {', '.join(sorted(foreign)[:5])}" if foreign else ""
         reason = reason or "; ".join(dict.fromkeys(span.reason for span in self.lost)) or "no data"
