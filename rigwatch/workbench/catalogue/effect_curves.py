@@ -62,7 +62,7 @@ def effect_curves(effect: Effect) -> tuple[Curve, ...]:
 
 def _first(effect: Effect) -> str:
     """The variable used as position: the first that the effect names."""
-    seen = [n for n in ("x", "p", "pu", "i", "psi", "T") if n in _names(effect)]
+    seen = [n for n in ("x", "p", "pu", "i", "ic", "psi", "T") if n in _names(effect)]
     return seen[0] if seen else "x"
 
 
