@@ -26,8 +26,6 @@ import ctypes
 import gc
 import threading
 
-import numpy as np
-
 _TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8
 """Options of mallopt(3)."""
 POOLS = 2
@@ -68,9 +66,16 @@ def settle_memory() -> None:
     gc.collect()
     if not _kept:
         _kept.append([bytes(SMALL) for _ in range(ROOM // SMALL)][-1])
-        for size in ARRAYS:
-            _made = [np.ones(size, np.uint8) for _ in range(OF_EACH)]
+        _fill_cache_of_arrays()
     gc.freeze()
+
+
+def _fill_cache_of_arrays() -> None:
+    # Commands that only print their help import this module, and must not wait for numpy.
+    import numpy as np
+
+    for size in ARRAYS:
+        _made = [np.ones(size, np.uint8) for _ in range(OF_EACH)]
 
 
 def keep_memory_tidy(stop: threading.Event) -> None:
