@@ -133,6 +133,11 @@ IN_IRON = 6.0
 STRENGTH, MOVING, SUSPENSION, DAMPING = 7.0, 0.02, 1800.0, 1.2
 """[N/A], [kg], [N/m], [N s/m]."""
 
+
+def _even(_x: float) -> float:
+    return STRENGTH
+
+
 FACTORS: dict[str, Callable[[float], float]] = {
     "gain_along_travel": lambda x: STRENGTH * math.exp(-x / 0.05),
     "gain_towards_ends": lambda x: STRENGTH / (1 + (x / 0.012) ** 2),
@@ -150,6 +155,7 @@ def shake(inputs: FloatArray, dt: float, hidden: str) -> FloatArray:
 
     Currents in the iron are those of a second winding, which is shorted.
     """
+    factor_at = FACTORS.get(hidden, _even)
     shared = SHARED if hidden == "eddy_currents" else 0.0
     apart = OWN * IRON - shared * shared
     flux, ring, x, pushed, h = 0.0, 0.0, 0.0, 0.0, dt / GAP_STEPS
@@ -157,14 +163,13 @@ def shake(inputs: FloatArray, dt: float, hidden: str) -> FloatArray:
     for k in range(len(inputs)):
         for step in range(GAP_STEPS):
             amp = (IRON * flux - shared * ring) / apart
-            induced = (OWN * ring - shared * flux) / apart
+            eddy = (OWN * ring - shared * flux) / apart
             if step == 0:
                 read[k] = x, amp
-            factor = FACTORS[hidden](x) if hidden in FACTORS else STRENGTH
-            speed = pushed / MOVING
+            factor, speed = factor_at(x), pushed / MOVING
             volt = between(inputs, k, (step + 0.5) / GAP_STEPS)[0]
             flux += h * (volt - COIL * amp - factor * speed)
-            ring -= h * IN_IRON * induced
+            ring -= h * IN_IRON * eddy
             pushed += h * (factor * amp - DAMPING * speed - SUSPENSION * x)
             x += h * pushed / MOVING
     return read

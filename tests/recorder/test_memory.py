@@ -9,6 +9,10 @@ import pytest
 from rigwatch.wire.host import few_pools
 from tests.bus.rig import CONFIG, TestRig
 
+on_linux = pytest.mark.skipif(
+    not sys.platform.startswith("linux"), reason="pools are those of glibc, memory is in /proc"
+)
+
 POOLS_OF_EIGHT_THREADS = """
 import contextlib, ctypes, sys, threading
 from pathlib import Path
@@ -48,7 +52,7 @@ barrier.wait()
         "router.run(load_rig(sys.argv[1]), stop)",
     ],
 )
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="pools are those of glibc")
+@on_linux
 def test_threads_share_few_pools(tmp_path: Path, begin: str) -> None:
     config, pools = tmp_path / "rig.toml", tmp_path / "pools.xml"
     text = CONFIG.format(router=1, listen=1, lease=1.0)
@@ -89,16 +93,28 @@ every_process = pytest.mark.parametrize(
 )
 
 
+def printed(
+    program: str, *arguments: Path, folder: Path | None = None, timeout: float = 60.0
+) -> str:
+    """What a program prints, in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-c", program, *map(str, arguments)],
+        cwd=folder, check=True, timeout=timeout, capture_output=True, text=True,
+    ).stdout  # fmt: skip
+
+
+def numbers_from(program: str) -> list[int]:
+    """The numbers that a program prints."""
+    return [int(word) for word in printed(program).split()]
+
+
 def said_by(folder: Path, program: str, begin: str, timeout: float) -> list[str]:
     """The words that a program prints which begins one of the processes."""
     with TestRig(folder) as rig:
         if "router" not in begin:
             rig.router()
-        said = subprocess.run(
-            [sys.executable, "-c", program.format(begin=begin), str(rig.path)],
-            cwd=folder, check=True, timeout=timeout, capture_output=True, text=True,
-        )  # fmt: skip
-    return said.stdout.split()
+        code = program.format(begin=begin)
+        return printed(code, rig.path, folder=folder, timeout=timeout).split()
 
 
 @every_process
@@ -161,16 +177,9 @@ print(round(memory_kb(os.getpid()) - before), sum(map(len, needed)) // 1000)
 """
 
 
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="memory is read from /proc")
+@on_linux
 def test_what_is_needed_for_a_moment_finds_room_that_is_there() -> None:
-    said = subprocess.run(
-        [sys.executable, "-c", PASSING_NEEDS],
-        check=True,
-        timeout=60,
-        capture_output=True,
-        text=True,
-    )
-    grown_kb, needed_kb = map(int, said.stdout.split())
+    grown_kb, needed_kb = numbers_from(PASSING_NEEDS)
     assert needed_kb > 400
     assert grown_kb < needed_kb / 4
 
@@ -195,16 +204,9 @@ print(round(most), round(memory_kb(os.getpid()) - before), len(between))
 """
 
 
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="memory is read from /proc")
+@on_linux
 def test_pages_between_what_is_kept_are_given_back() -> None:
-    said = subprocess.run(
-        [sys.executable, "-c", FREED_BETWEEN_OTHERS],
-        check=True,
-        timeout=60,
-        capture_output=True,
-        text=True,
-    )
-    most_kb, kept_kb, _ = map(int, said.stdout.split())
+    most_kb, kept_kb, _ = numbers_from(FREED_BETWEEN_OTHERS)
     assert most_kb > 9_000
     assert kept_kb < most_kb / 4
 
@@ -229,13 +231,7 @@ print((library.mallinfo2().used - before) // 1000)
 """
 
 
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="pools are those of glibc")
+@on_linux
 def test_arrays_of_new_lengths_find_what_numpy_keeps() -> None:
-    said = subprocess.run(
-        [sys.executable, "-c", ARRAYS_OF_ALL_LENGTHS],
-        check=True,
-        timeout=60,
-        capture_output=True,
-        text=True,
-    )
-    assert int(said.stdout) < 50
+    (grown_kb,) = numbers_from(ARRAYS_OF_ALL_LENGTHS)
+    assert grown_kb < 50
