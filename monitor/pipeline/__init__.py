@@ -6,7 +6,14 @@ RigMonitor.update(block) ──▶ admission ──▶ residual ──▶ decisi
 from monitor.pipeline.pipeline import Monitor
 from monitor.pipeline.promoted import check_can_follow
 from monitor.pipeline.rig_monitor import Judged, RigMonitor, Watched, compile_kernels
-from monitor.pipeline.together import Finish, Ready, compile_together, judge_together, ready_of
+from monitor.pipeline.together import (
+    Finish,
+    Ready,
+    compile_together,
+    judge_alone,
+    judge_together,
+    ready_of,
+)
 
 __all__ = [
     "Finish",
@@ -18,6 +25,7 @@ __all__ = [
     "check_can_follow",
     "compile_kernels",
     "compile_together",
+    "judge_alone",
     "judge_together",
     "ready_of",
 ]

@@ -14,7 +14,15 @@ from monitor.alarms import AlarmJournal, Announcement, just_returned, read_end, 
 from monitor.detectors import FRICTION, detectors_of
 from monitor.diagnosis import Explainer
 from monitor.model import RigModel, load_model
-from monitor.pipeline import Judged, Ready, RigMonitor, compile_kernels, ready_of
+from monitor.pipeline import (
+    Judged,
+    Ready,
+    RigMonitor,
+    compile_kernels,
+    compile_together,
+    judge_alone,
+    ready_of,
+)
 from monitor.process.cursor import Cursor
 from monitor.process.health import HealthBook
 from monitor.process.key_watch import KeyWatch
@@ -51,6 +59,7 @@ from rigwatch.wire.host import (
     prepare_for_real_time,
     raise_priority,
     set_at_signal,
+    tidy_memory,
 )
 from rigwatch.wire.messages import (
     ALARMS,
@@ -263,7 +272,7 @@ class MonitorProcess:
             if known:
                 self.rig.learn(cut(block, 0, known))
             fresh = cut(block, known, len(block)) if known else block
-            judged = self.rig.judge(fresh) if len(fresh) else None
+            judged = judge_alone(self.rig, fresh) if len(fresh) else None
         except KeyError as error:
             self._unsuitable = f"samples without the channel {error} that the model needs"
             return
@@ -436,7 +445,10 @@ def prepared(config: RigConfig, path: Path | str) -> RigModel:
     """
     model = suitable_model(config, path)
     names = monitor_section(config, path).detectors
-    compile_kernels(model, detectors_of(names, model, path))
+    detectors = detectors_of(names, model, path)
+    compile_kernels(model, detectors)
+    if not detectors:
+        compile_together(model)
     return model
 
 
@@ -444,6 +456,7 @@ def watch(process: MonitorProcess, stop: threading.Event) -> None:
     """The loop: samples as they arrive, everything else in between, until `stop` is set."""
     heartbeat = Heartbeat("monitor")
     prepare_for_real_time()
+    tidy_memory(stop)
     heartbeat.ready()
     looked = 0.0
     while not stop.is_set():

@@ -22,7 +22,7 @@ from functools import partial
 from pathlib import Path
 
 from monitor.model import RigModel
-from monitor.pipeline import Finish, Ready, compile_together, judge_together
+from monitor.pipeline import Finish, Ready, judge_together
 from monitor.process.loop import (
     LONGEST_BLOCK,
     MonitorProcess,
@@ -38,6 +38,7 @@ from rigwatch.wire.host import (
     prepare_for_real_time,
     raise_priority,
     set_at_signal,
+    tidy_memory,
     waits_of,
 )
 from rigwatch.wire.messages import SampleBlock, pieces
@@ -48,8 +49,6 @@ TURN = 0.005
 """Time from one turn to the next: samples wait for half of it on average [s]."""
 LOOK_EVERY = 0.1
 """Time from one look at a rig's commands, link and silence to the next [s]."""
-FEWEST_TOGETHER = 2
-"""Rigs of which a block has come, from which on they are judged together."""
 MOST_BLOCKS = 4
 """Blocks of one rig in a turn while it catches up, so that the others go on."""
 FIRST_PAUSE, LONGEST_PAUSE = 1.0, 30.0
@@ -271,11 +270,10 @@ def one_turn(
 def _judge_first(seats: Iterable[Seat]) -> None:
     """Judge the first blocks of all rigs together where they simply follow the last ones."""
     found = [(seat, ready) for seat in seats if (ready := seat.ready()) is not None]
-    if len(found) >= FEWEST_TOGETHER:
-        finishes = judge_together([ready for _, ready in found])
-        for (seat, _), finish in zip(found, finishes, strict=True):
-            if finish is not None:
-                seat.finish(finish)
+    finishes = judge_together([ready for _, ready in found])
+    for (seat, _), finish in zip(found, finishes, strict=True):
+        if finish is not None:
+            seat.finish(finish)
 
 
 def take_turns(
@@ -318,6 +316,7 @@ def run_several(paths: list[Path]) -> int:
     raise_priority(MONITOR)
     heartbeat = Heartbeat("monitor")
     prepare_for_real_time()
+    tidy_memory(stop)
     links = SharedLinks(len(paths))
     seats = [Seat(path, _log.warning, partial(connect, links=links)) for path in paths]
     heartbeat.ready()
@@ -332,7 +331,7 @@ def run_several(paths: list[Path]) -> int:
 def _prepare(path: Path, config: RigConfig) -> None:
     """Compile what the rig needs before any is watched; its seat says what is wrong with it."""
     with contextlib.suppress(RigwatchError):
-        compile_together(prepared(config, path))
+        prepared(config, path)
 
 
 def _journals(loaded: list[tuple[Path, RigConfig]]) -> Iterable[tuple[Path, str]]:

@@ -16,7 +16,7 @@ from sim_plant.scenario import Scenario
 ACTS = {
     "coulomb": ("dry friction of {value:g} N begins", "the friction ends"),
     "actuator_gain": (
-        "the valve's gain falls to {value:.0%}, which shows only while its voltage is far from 0",
+        "the valve's gain falls to {value:.0%}, which makes no difference near 0 V",
         "the valve's gain is whole again",
     ),
 }
@@ -25,9 +25,14 @@ WHERE_TO_LOOK = (
     "which stays within its limits while the rig is healthy",
 )
 NEUTRAL = {"coulomb": 0.0, "actuator_gain": 1.0}
-WHY_LATER = "later than the alarm: every known effect is compared with two seconds of samples"
+CAUSE_FOLLOWS = (
+    "what is missing in the rig's model follows: every known effect is compared with two seconds",
+    "of samples, which takes some seconds, and up to a minute the first time or on a busy machine",
+)
 SIZE = "theta1"
 """The monitor's estimate of dry friction, in units of that which it was commissioned with."""
+SIZED_AFTER = 2.0
+"""Time from the naming of dry friction to the estimate of its size that is told [s]."""
 _STATEMENTS = re.compile(r"(\w+@\w+) (\(.*?\)): (explains [^;]*)(?:;(.*))?", re.DOTALL)
 ENDED = ("normal", "cleared_unacknowledged")
 NAMELESS = "departure"
@@ -111,7 +116,8 @@ class Narrator:
     ) -> None:
         self.alarms: list[Alarm] = []
         self.explained = False
-        self._attended, self._known, self._size = attended, known, 0.0
+        self._attended, self._known = attended, known
+        self._size, self._sized_at = 0.0, inf
         self._say, self._config, self._studies = say, rig, studies
         self._rate, self._cycle_s = scenario.plant.sample_rate, scenario.cycle_s
         self._acts = acts(scenario)
@@ -171,8 +177,10 @@ class Narrator:
 
         The monitor may lag behind the samples, and a name that follows a departure with it.
         """
-        self._size = float(block.column(SIZE).values[-1])
         seq = block.seq + len(block)
+        # Its explanation may come after the friction has ended.
+        if seq <= self._sized_at:
+            self._size = float(block.column(SIZE).values[-1])
         if self._ended is not None and seq > self._ended.seq + self._rate:
             self._tell_end()
 
@@ -185,6 +193,8 @@ class Narrator:
                 self._ended = None  # the fault persists, under its name
             self._tell(alarm)
             self.alarms.append(alarm)
+            if alarm.name == ALARM:
+                self._sized_at = alarm.seq + SIZED_AFTER * self._rate
         elif alarm.name in self._told and alarm.state in ENDED:
             self._tell_end()
             self._ended = alarm
@@ -212,6 +222,9 @@ class Narrator:
         """Say once for each name what to do, and once where all alarms are listed."""
         if alarm.name not in self._told:
             self._say(f"            what to do: {alarm.guidance_for(self._config)}")
+        if alarm.name in OF_THE_RIG and not self._told & set(OF_THE_RIG):
+            for line in CAUSE_FOLLOWS:
+                self._say(f"            {line}")
         if self._attended and alarm.name != NAMELESS and self._told <= {NAMELESS}:
             self._say(f"            all alarms: $ rigwatch alarms {self._config}")
             self._say("            (an alarm is kept, even once its cause has gone, until somebody")
@@ -226,7 +239,6 @@ class Narrator:
             self._say(f"            probably missing in the rig's model: {first}")
             for line in more:
                 self._say(f"              {line}")
-            self._say(f"            ({WHY_LATER})")
             newest = next((a.name for a in self.alarms[::-1] if a.name in OF_THE_RIG), "")
             # An explanation bears the name of the first alarm, which is mostly a departure.
             if newest == ALARM or event.text.startswith(ALARM):

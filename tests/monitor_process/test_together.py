@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 
 from monitor.model.model_file import RigModel
-from monitor.pipeline import RigMonitor, judge_together, ready_of
+from monitor.pipeline import RigMonitor, judge_alone, judge_together, ready_of
 from rigwatch.wire.messages import SampleBlock, cut, encode
 from rigwatch.wire.messages import quality_flags as quality
 from tests.monitor.monitor_rig import OTHER_SINE, SINE, block, friction, model, run
@@ -83,3 +83,13 @@ def test_each_rig_gets_what_it_gets_alone() -> None:
     count = len(rigs[0])
     assert all(0.5 * count < taken < count - 4 for taken in together)
     assert min(said) > 0
+
+
+def test_a_rig_by_itself_is_judged_by_the_kernel_with_the_same_results() -> None:
+    plain, rig = RigMonitor(clipping_model()), RigMonitor(clipping_model())
+    for part in pieces_of(with_bad_readings(), {50, 150, 151}, 10**6):
+        single, mine = plain.judge(part), judge_alone(rig, part)
+        assert (single is None) == (mine is None)
+        if single is not None and mine is not None:
+            assert encode(mine[0]) == encode(single[0])
+            assert repr(rig.announce(*mine)) == repr(plain.announce(*single))

@@ -3,13 +3,19 @@
 from rigwatch.wire.host.both_clocks import both_clocks
 from rigwatch.wire.host.disk_space import free_share
 from rigwatch.wire.host.ending import set_at_hangup, set_at_signal
-from rigwatch.wire.host.few_pools import keep_memory_tidy, settle_memory, use_few_pools
+from rigwatch.wire.host.few_pools import (
+    keep_memory_tidy,
+    settle_memory,
+    tidy_memory,
+    use_few_pools,
+)
 from rigwatch.wire.host.heartbeat import NO_ROUTER, WAITS, Heartbeat, waits_for_samples, waits_of
 from rigwatch.wire.host.one_keeper import Hold, Kept
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
 from rigwatch.wire.host.processes import end_process, end_with_parent, last_line
 from rigwatch.wire.host.realtime import (
     DAQ,
+    DEVICE,
     MONITOR,
     ROUTER,
     be_idle,
@@ -21,6 +27,7 @@ from rigwatch.wire.host.whole_file import replace_file, write_through
 
 __all__ = [
     "DAQ",
+    "DEVICE",
     "MONITOR",
     "NO_ROUTER",
     "ROUTER",
@@ -50,6 +57,7 @@ __all__ = [
     "set_at_hangup",
     "set_at_signal",
     "settle_memory",
+    "tidy_memory",
     "use_few_pools",
     "waits_for_samples",
     "waits_of",

@@ -79,11 +79,16 @@ def _fill_cache_of_arrays() -> None:
 
 
 def keep_memory_tidy(stop: threading.Event) -> None:
-    """Settle the memory, then collect garbage and empty pages once a minute until `stop` is set.
-
-    For processes in which a pause of a millisecond does not matter; in a thread of its own.
-    """
+    """Settle the memory, and tidy it until `stop` is set."""
     settle_memory()
+    tidy_memory(stop)
+
+
+def tidy_memory(stop: threading.Event) -> None:
+    """Collect garbage and empty pages once a minute until `stop` is set, in a thread of its own.
+
+    For processes in which a pause of a millisecond does not matter.
+    """
     threading.Thread(target=_tidy, args=(stop,), name="tidying", daemon=True).start()
 
 
