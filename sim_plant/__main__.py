@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigwatch.wire.errors import ConfigError, RigwatchError
-from rigwatch.wire.host import DEVICE, Heartbeat, raise_priority, set_at_signal
+from rigwatch.wire.host import Heartbeat, set_at_signal
 from rigwatch.wire.rig_config import PlantSection, RigConfig, load_rig, section_or_error
 from sim_plant.effects import CHANNELS, EFFECTS
 from sim_plant.scenario import ScenarioRun, load_scenario
@@ -46,7 +46,6 @@ def serve(config: RigConfig, plant: PlantSection, stop: threading.Event) -> None
     device, faults = Device(controlled), LineFaults(plant.seed)
     neutral = {name: effect.neutral for name, effect in EFFECTS.items()}
     commands = Commands(controlled, device, faults if plant.serve == "serial" else None, neutral)
-    raise_priority(DEVICE)  # a real one does not fall behind because a machine is busy
     with ControlServer(control_path(config.rig.id), commands.answer):
         _SERVERS[plant.serve](plant, device, rate, faults, stop)
 

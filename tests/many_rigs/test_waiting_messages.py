@@ -14,7 +14,6 @@ from tests.bus.samples import block
 from tests.bus.test_complete_subscription import alarm
 from tests.waiting import PATIENCE, eventually
 
-
 EARLIER = 99
 
 

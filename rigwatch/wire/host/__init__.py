@@ -15,7 +15,6 @@ from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is
 from rigwatch.wire.host.processes import end_process, end_with_parent, last_line
 from rigwatch.wire.host.realtime import (
     DAQ,
-    DEVICE,
     MONITOR,
     ROUTER,
     be_idle,
@@ -27,7 +26,6 @@ from rigwatch.wire.host.whole_file import replace_file, write_through
 
 __all__ = [
     "DAQ",
-    "DEVICE",
     "MONITOR",
     "NO_ROUTER",
     "ROUTER",

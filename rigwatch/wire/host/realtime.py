@@ -12,9 +12,8 @@ SWITCH_INTERVAL = 0.0005
 
 NICENESS = -10
 """Used if real time is not allowed; no effect between sessions if the kernel groups by session."""
-MONITOR, DAQ, ROUTER, DEVICE = 1, 2, 3, 4
-"""A monitor that catches up must not delay the samples or their transport, and none of them a
-simulated device."""
+MONITOR, DAQ, ROUTER = 1, 2, 3
+"""A monitor that catches up must not delay the samples or their transport."""
 
 
 def raise_priority(urgency: int) -> None:
@@ -25,8 +24,7 @@ def raise_priority(urgency: int) -> None:
     share of each core for other work even if the process never sleeps.
 
     Args:
-        urgency: rank among the processes that call this: `MONITOR`, `DAQ`, `ROUTER` or
-            `DEVICE`.
+        urgency: rank among the processes that call this: `MONITOR`, `DAQ` or `ROUTER`.
     """
     with contextlib.suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(urgency))
