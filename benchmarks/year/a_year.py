@@ -4,7 +4,7 @@
     control room: a listener and operator ─────────────────────────┘
          ▲ this process: the clock, the plan, faults, kills; memory and disk after each session
 
-A thousand sessions of 25 s spread over the year, at ten times the machine's pace; between two
+A thousand sessions of 25 s spread over the year, at fourteen times the machine's pace; between two
 of them the rig is switched off and the machine sleeps for hours, so that Unix time steps. Midnight,
 both changes of daylight saving time, a leap second and the turn of the year lie within sessions.
 Recordings of earlier years fill the 2 GB that the recording may use, so that each new one takes the
@@ -30,7 +30,7 @@ from benchmarks.year.rig_of_the_year import PROCESSES, RigOfTheYear
 from tools.benchmark_table import Row
 from tools.memory_series import Memory
 
-RATE = 10.0
+RATE = 14.0
 LIMIT_BYTES, SMALLEST = 2e9, 2e6
 """What the recording may use in a year, a part of it in a part of a year, and its least [bytes]."""
 BETWEEN_CHECKS = 100e6 / 60.0
