@@ -271,6 +271,7 @@ def without_lasting() -> RigModel:
         healthy, steady_paces=(), steady_sizes=(), steady_narrow=(), steady_drives=(),
         steady_energies=(), steady_motion_bands=(),
         steady_shorts=(), steady_mediums=(), steady_frictions=(), steady_onsets=(),
+        steady_skews=(),
     )  # fmt: skip
     return structs.replace(model(), healthy=bare)
 
