@@ -140,6 +140,13 @@ class HealthyLimits(Section, frozen=True, kw_only=True):
         Floats,
         Meta(description="largest evidence of the onset of dry friction of each, in the same"),
     ] = ()
+    steady_skews: Annotated[
+        Floats,
+        Meta(
+            description="skewness of the speed of each, of the rate of its speed, and what both "
+            "vary by, in turn"
+        ),
+    ] = ()
 
 
 class SchemeSection(Section, frozen=True, kw_only=True):

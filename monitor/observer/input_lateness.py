@@ -7,7 +7,9 @@ it explains nearly all of it and leaves at most half of what dry friction would.
 the rig is not judged and followed slowly afterwards, so that a fault, which is sudden, is not
 learnt. Only a motion that is steady is known to have been recorded; then the healthy residual is
 known to be smaller than it was taken to be, and what was seen before decides anew, also where it
-now deviates.
+now deviates. More mass, a spring or a lower supply may leave the same residual at one frequency.
+They change size or shape of the motion, which later inputs only shift: under a drive that was
+recorded, a lateness is believed if the motion is the recorded one.
 """
 
 # Compiled functions are untyped to mypy.
@@ -20,9 +22,9 @@ from monitor.signals import fill
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import part
 
-MOST = 1.25
-"""Largest lateness [samples]: that of a held voltage, and what the response, which is that to later
-inputs, lacks for earlier ones.
+LATEST, EARLIEST = 1.15, -1.25
+"""Largest lateness either way [samples]: that of a held voltage, the relative error of the response
+(`UNSURE`), and what the response, which is that to later inputs, lacks for earlier ones.
 """
 QUICK, SLOW = 32.0, 128.0
 """Memory of what it is learnt from, before and while the rig is judged [samples]."""
@@ -56,17 +58,22 @@ SHOWN, RECENT = 128.0, 4096.0
 """Samples for which a lateness must be found to count, as at a start there may be a false one; and
 those after which one no longer found is forgotten: the longest interval between skips.
 """
+HALF_SETTLED, SETTLED = 384.0, 768.0
+"""Samples of a motion under a recorded drive after which the means of its size and shape contain
+so little of the start that twice the limit tells another motion, and nothing of it any more.
+"""
 ERRORS, PRODUCTS, RESPONSES, RUBBED, FRICTIONS = range(5)
 """Means of e², e·s, s², e·g and g², with g the response to dry friction."""
-OF_QUICK, OF_SLOW, TAU, FOR, AGO = 0, 5, 10, 11, 12
-"""Carried figures: the means with both memories, τ, the time for which it has mattered, and the
-time since it did, `RECENT` if never.
+OF_QUICK, OF_SLOW, TAU, FOR, AGO, COMPARED, DENIED = 0, 5, 10, 11, 12, 13, 14
+"""Carried figures: the means with both memories, τ, the time for which it has mattered, the time
+since it did, `RECENT` if never, that for which the motion could be compared, and whether it is
+another one.
 """
 
 
 def no_lateness() -> FloatArray:
     """The figures at the start."""
-    kept = np.zeros(AGO + 1)
+    kept = np.zeros(DENIED + 1)
     kept[AGO] = RECENT
     return kept
 
@@ -94,6 +101,8 @@ def follow_lateness(  # noqa: PLR0917 -- a kernel
     """
     if learns:
         _learn(row, kept)
+    if kept[DENIED] > 0.0:
+        return
     first = OF_SLOW if judging and not is_late(kept) and not slides(kept) else OF_QUICK
     energy, found = kept[first + ERRORS], _best(kept, first)
     least = (1.0 - EXPLAINS) * energy + REST * largest
@@ -101,12 +110,37 @@ def follow_lateness(  # noqa: PLR0917 -- a kernel
         usually = (1.0 - EXPLAINS) * energy + USUAL * largest
         least = max(least, min(usually, (1.0 - MOST_OF_IT) * energy))
     least = min(least, _rubbing(kept, first) / RATHER)
-    if energy > largest and _left(found, kept, first) < least and abs(found) < MOST:
+    if energy > largest and _left(found, kept, first) < least and EARLIEST < found < LATEST:
         kept[TAU] = found
     else:
         kept[TAU] = _towards_none(kept[TAU], found)
     kept[FOR] = kept[FOR] + 1.0 if abs(kept[TAU]) > UNSTEADY else 0.0
     kept[AGO] = 0.0 if kept[FOR] >= SHOWN else min(kept[AGO] + 1.0, RECENT)
+
+
+@part()
+def compare_motion(altered: float, calm: bool, kept: FloatArray) -> None:
+    """Deny a lateness if the motion is not the recorded one, shifted, or no input can be so late.
+
+    It is compared until its means have settled: friction that begins later changes the size of a
+    motion that is late.
+
+    Args:
+        altered: deviation of its size and shape, 1 at the limit; 0 if the drive was not recorded.
+        calm: whether the rig is judged and has not departed.
+        kept: the carried figures.
+    """
+    if altered == 0.0:
+        kept[COMPARED] = kept[DENIED] = 0.0
+        return
+    if kept[COMPARED] >= SETTLED:
+        return
+    kept[COMPARED] += 1.0
+    if not calm or kept[COMPARED] < HALF_SETTLED or abs(kept[TAU]) <= UNSTEADY:
+        return
+    limit = 1.0 + (SETTLED - kept[COMPARED]) / (SETTLED - HALF_SETTLED)
+    if altered > limit or _best(kept, OF_SLOW) in (EARLIEST, LATEST):
+        kept[DENIED], kept[TAU], kept[FOR], kept[AGO] = 1.0, 0.0, 0.0, RECENT
 
 
 @part()
@@ -203,7 +237,7 @@ def lateness_changes(kept: FloatArray) -> bool:
     is none: something else has changed.
     """
     found, before = _best(kept, OF_QUICK), _best(kept, OF_SLOW)
-    if not is_late(kept) or abs(found) >= MOST or abs(found - before) <= UNSTEADY:
+    if not is_late(kept) or found in (EARLIEST, LATEST) or abs(found - before) <= UNSTEADY:
         return False
     some = _left(found, kept, OF_QUICK) < (1.0 - SOME_OF_IT) * kept[OF_QUICK + ERRORS]
     return some and not rubs(kept)
@@ -213,7 +247,7 @@ def lateness_changes(kept: FloatArray) -> bool:
 def _best(kept: FloatArray, first: int) -> float:
     """The lateness that explains most."""
     found = kept[first + PRODUCTS] / max(kept[first + RESPONSES], 1e-300)
-    return min(max(found, -MOST), MOST)
+    return min(max(found, EARLIEST), LATEST)
 
 
 @part()

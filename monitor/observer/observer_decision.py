@@ -74,6 +74,7 @@ from monitor.observer.decision_state import (
 from monitor.observer.input_lateness import (
     TAU,
     UNSURE,
+    compare_motion,
     follow_lateness,
     forget_lateness,
     is_late,
@@ -167,6 +168,7 @@ def decide(  # noqa: PLR0917 -- a kernel
     steady: NDArray[np.bool_],
     usual: FloatArray,
     response: FloatArray,
+    altered: FloatArray,
     state: Codes,
     rules: DecisionRules,
     kept: DecisionState,
@@ -181,7 +183,7 @@ def decide(  # noqa: PLR0917 -- a kernel
         _follow_drive(drive[k], steady[k], kept)
         kept.counts[GAP_AGO] = 0 if state[k] == TAINTED else kept.counts[GAP_AGO] + 1
         if state[k] != TAINTED:
-            _follow_inputs(kept, judged[k], usual[:, k], rules)
+            _follow_inputs(kept, judged[k], usual[:, k], altered[k], rules)
             _remember(kept, judged[k], speed[k], levels[k])
         _follow_jumps(jumped[k], kept)
         _one(k, inside[k], usual[:, k], response[k], rules, kept, out)
@@ -228,7 +230,7 @@ def _follow_jumps(jumped: bool, kept: DecisionState) -> None:
 
 @part()
 def _follow_inputs(
-    kept: DecisionState, row: FloatArray, usual: FloatArray, rules: DecisionRules
+    kept: DecisionState, row: FloatArray, usual: FloatArray, altered: float, rules: DecisionRules
 ) -> None:
     """Learn the inputs' edges and lateness, except in an episode, and correct the residual.
 
@@ -254,6 +256,7 @@ def _follow_inputs(
     if learns or (calm and anew):
         variance += edges_unsure(row[UNSURE_INPUT], kept.edges)
         follow_lateness(row, largest * variance, judging, learns, anew, kept.lateness)
+    compare_motion(altered, judging and calm, kept.lateness)
     if not judging and lateness_changes(kept.lateness):
         count[CHANGED] = -LONG
     elif not judging and seems_to_grow(kept.lateness):

@@ -95,7 +95,7 @@ def range_of(
         bends: largest differences of channels that measure a state.
     """
     every = np.concatenate(parts)
-    narrow, pace, size = (np.concatenate(part) for part in zip(*motions, strict=True))
+    narrow, pace, size, *_ = (np.concatenate(part) for part in zip(*motions, strict=True))
     sizes = size.max(initial=0.0) / LEVEL_STEP ** np.arange(LEVELS)[::-1]
     drive_paces, motion_paces = kinds_of(motions, drives)
     return RangeSection(

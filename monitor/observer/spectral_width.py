@@ -5,6 +5,12 @@
 This is the bandwidth parameter of random processes (D. E. Cartwright, M. S. Longuet-Higgins, Proc.
 Royal Society A 237, 1956). A remainder fitted to single tones is not valid for several at once, as
 nonlinear terms missing in the equations mix them.
+
+    s = ⟨v³⟩/⟨v²⟩^1.5,   s' = ⟨(Δv)³⟩/⟨(Δv)²⟩^1.5
+
+The skewnesses of the speed and of its rate show how strong the second harmonic of a tone is, and
+its phase relative to the first: the bispectrum at one frequency, which no delay changes (J. M.
+Mendel, Proc. IEEE 79, 1991).
 """
 
 from typing import NamedTuple
@@ -29,11 +35,15 @@ class Spectrum(NamedTuple):
         narrow: q; 1 at rest and with an incomplete kernel.
         pace: mean frequency, from √(⟨(Δv)²⟩/⟨v²⟩) as for a tone [Hz]; 0 at rest.
         size: root mean square of the rate of the speed [m/s^2]; 0 at rest.
+        skew: skewness of the speed; 0 at rest.
+        skew_rate: skewness of its rate; 0 at rest.
     """
 
     narrow: FloatArray
     pace: FloatArray
     size: FloatArray
+    skew: FloatArray
+    skew_rate: FloatArray
 
 
 class SpectralWidth:
@@ -48,15 +58,15 @@ class SpectralWidth:
         self._leak = float(np.exp(-2.0 * np.pi * SLOWEST / rate))
         self._share = 1.0 / (MEMORY * rate)
         self._slow, self._rate = slow, rate
-        self._kept = np.zeros(5)
+        self._kept = np.zeros(7)
 
     def update(self, speed: FloatArray, state: Codes) -> Spectrum:
         """The spectrum after each sample of a speed of shape (n,)."""
-        out = np.zeros((3, len(speed)))
+        out = np.zeros((len(Spectrum._fields), len(speed)))
         out[0] = 1.0
         _advance(speed, state, self._leak, self._share, self._slow, self._kept, out)
-        narrow, pace, size = out
-        return Spectrum(narrow, pace * self._rate / (2.0 * np.pi), size * self._rate)
+        narrow, pace, size, *skews = out
+        return Spectrum(narrow, pace * self._rate / (2.0 * np.pi), size * self._rate, *skews)
 
 
 @kernel()
@@ -69,7 +79,9 @@ def _advance(  # noqa: PLR0917 -- a kernel
     kept: FloatArray,
     out: FloatArray,
 ) -> None:
-    """`kept` holds displacement, last speed, and mean squares of displacement, speed and change."""
+    """`kept` holds displacement, last speed, mean squares of displacement, speed and change, and
+    mean cubes of the last two.
+    """
     for k in range(state.size):
         if state[k] == EMPTY:
             continue
@@ -82,7 +94,11 @@ def _advance(  # noqa: PLR0917 -- a kernel
         kept[2] += share * (kept[0] * kept[0] - kept[2])
         kept[3] += share * (speed[k] * speed[k] - kept[3])
         kept[4] += share * (change * change - kept[4])
+        kept[5] += share * (speed[k] * speed[k] * speed[k] - kept[5])
+        kept[6] += share * (change * change * change - kept[6])
         if kept[3] > slow * slow:
             out[0, k] = kept[3] / max(np.sqrt(kept[2] * kept[4]), 1e-300)
             out[1, k] = np.sqrt(kept[4] / kept[3])
             out[2, k] = np.sqrt(kept[4])
+            out[3, k] = kept[5] / max(kept[3] * np.sqrt(kept[3]), 1e-300)
+            out[4, k] = kept[6] / max(kept[4] * np.sqrt(kept[4]), 1e-300)

@@ -5,7 +5,9 @@ motion that was recorded at commissioning is therefore compared with what was le
 which is far less than the worst of all motions. A smaller motion of the same kind, as faults of the
 drive cause, leaves no more than that. Under a drive that was recorded a healthy rig moves as it did
 then, so that any other steady motion is compared with that recording as well, and that its size is
-another one is evidence of a change by itself. A mass that drifts aside while it oscillates, as by a
+another one is evidence of a change by itself. Inputs that act later shift the motion and leave its
+size and shape as they were; more mass, a spring or a lower supply look the same in its phase, and
+change either. A mass that drifts aside while it oscillates, as by a
 wave whose edges jitter, is only known by that drive. Of all others, and while the motion changes,
 the extremes of a healthy rig are not known.
 """
@@ -28,6 +30,8 @@ DRIVE = 0.025
 """Relative difference of the drives' paces up to which they are the same: that of a triangle is 3
 to 10 % above a sine's, that of a square more.
 """
+SKEWS = slice(Spectrum._fields.index("skew"), None)
+"""Rows of a spectrum that are skewnesses."""
 SMALLEST = 0.6
 """Ratio of a smaller motion to a recorded one down to which it leaves no more."""
 RIPPLE = 2.0
@@ -41,7 +45,14 @@ drive tells it from others.
 STEADY = 0.9
 """Share of a recording that is the same motion as its median, if it is a steady one."""
 STEEPEST = 6.0
-"""Largest relative change of a healthy motion's size over that of its drive's frequency."""
+"""Largest relative change of a healthy motion's size over that of its drive's frequency, and of its
+shape.
+"""
+SHIFTED_SIZE, SHIFTED_SHAPE, VARIES, FAINT = 0.03, 0.1, 3.0, 0.004
+"""Relative differences of size and skewnesses up to which a motion is the recorded one, shifted.
+Besides, skewnesses may differ by a multiple of what those of the recording usually vary by, and by
+what the steps of a coarse sensor make of a motion that is sampled at other instants.
+"""
 
 
 class Extremes(NamedTuple):
@@ -62,6 +73,14 @@ NO_DRIVE = (0.0,) * BANDS
 """Energies of a drive that is not a steady one."""
 
 
+class Shape(NamedTuple):
+    """Skewnesses of a motion's speed and of its rate, and what they vary by; NaN if not known."""
+
+    skew: float = np.nan
+    skew_rate: float = np.nan
+    spread: float = np.nan
+
+
 class Motion(NamedTuple):
     """A steady motion, the extremes of its healthy residual, and energies of the drive's bands.
 
@@ -74,6 +93,7 @@ class Motion(NamedTuple):
     drive: float
     extremes: Extremes
     bands: tuple[float, ...] = NO_DRIVE
+    shape: Shape = Shape()
 
 
 class Usual(NamedTuple):
@@ -83,10 +103,12 @@ class Usual(NamedTuple):
         extremes: of the residual, infinite where they are not known, shape (5, n).
         response: deviation of the motion's size from that under the same drive, 1 at its limit, 0
             where the drive was not recorded, shape (n,).
+        altered: the same of its size and shape, from what later inputs leave of them.
     """
 
     extremes: FloatArray
     response: FloatArray
+    altered: FloatArray
 
 
 class UsualError:
@@ -125,21 +147,25 @@ class UsualError:
         for known in (smaller, driven):
             found = np.where(found > 0.0, found, known)
         extremes = np.where(steady & (found > 0.0), found, np.inf)
-        return Usual(extremes, self._response(smooth, settled, drive, bands))
+        return Usual(extremes, *self._responses(smooth, settled, drive, bands))
 
-    def _response(
+    def _responses(
         self, smooth: Spectrum, settled: NDArray[np.bool_], drive: FloatArray, bands: FloatArray
     ) -> FloatArray:
-        """Deviation of the motion's size from that under the same drive, shape (n,)."""
-        nearest = np.full(settled.size, np.inf)
+        """`response` and `altered` of `Usual`, shape (2, n)."""
+        nearest = np.full((2, settled.size), np.inf)
         size, energy = np.maximum(smooth.size, 1e-300), bands.sum(axis=1)
         for motion in self._known:
             faster = np.abs(drive - motion.drive) / max(motion.drive, 1e-300)
             same = settled & _driven(bands, motion) & (faster <= DRIVE)
             healthy = motion.size * np.sqrt(energy[same] / max(sum(motion.bands), 1e-300))
-            allowed = np.log1p(SIZE + STEEPEST * faster[same])
-            off = np.abs(np.log(size[same] / healthy)) / allowed
-            nearest[same] = np.minimum(nearest[same], off)
+            slope, off = STEEPEST * faster[same], np.abs(np.log(size[same] / healthy))
+            shape = _reshaped(smooth, slope, same, motion.shape)
+            found = [
+                off / np.log1p(SIZE + slope),
+                np.hypot(off / np.log1p(SHIFTED_SIZE + slope), shape),
+            ]
+            nearest[:, same] = np.minimum(nearest[:, same], found)
         return np.where(np.isfinite(nearest), nearest, 0.0)
 
 
@@ -163,7 +189,9 @@ def steady_motion(
         return None
     smooth = _Smooth(rate).update(seen)
     pace, size, narrow = (float(np.median(x)) for x in (smooth.pace, smooth.size, smooth.narrow))
-    middle = Motion(pace, size, narrow, float(np.median(drive)), extremes, bands or NO_DRIVE)
+    middle = Motion(
+        pace, size, narrow, float(np.median(drive)), extremes, bands or NO_DRIVE, _shape_of(smooth)
+    )
     as_large = np.abs(smooth.size - size) <= SIZE * size
     if size > 0.0 and np.mean(as_large & _of_kind(smooth, drive, middle)) >= STEADY:
         return middle
@@ -172,18 +200,25 @@ def steady_motion(
 
 
 class _Smooth:
-    """Carries the smoothing of a spectrum, which has a ripple of twice the motion's frequency."""
+    """Carries the smoothing of a spectrum, which has a ripple of twice the motion's frequency.
+
+    Its skewnesses have one of the motion's own frequency and are smoothed twice.
+    """
 
     def __init__(self, rate: float) -> None:
         self._share = 1.0 / (MEMORY * rate)
         self._kept: FloatArray | None = None
+        self._again: FloatArray | None = None
 
     def update(self, seen: Spectrum) -> Spectrum:
         # The first sample after a restart in motion has no change yet, and no bound narrowness.
-        rows = np.stack([np.minimum(seen.narrow, NARROWEST), seen.pace, seen.size])
+        rows = np.stack([np.minimum(seen.narrow, NARROWEST), *seen[1:]])
         share, kept = self._share, self._kept
         kept = (1.0 - share) * rows[:, :1] if kept is None else kept
-        smooth, self._kept = scipy.signal.lfilter([share], [1.0, share - 1.0], rows, zi=kept)
+        by = [share], [1.0, share - 1.0]
+        smooth, self._kept = scipy.signal.lfilter(*by, rows, zi=kept)
+        again = (1.0 - share) * smooth[SKEWS, :1] if self._again is None else self._again
+        smooth[SKEWS], self._again = scipy.signal.lfilter(*by, smooth[SKEWS], zi=again)
         return Spectrum(*smooth)
 
 
@@ -193,14 +228,40 @@ def _known(limits: HealthyLimits) -> Iterator[Motion]:
     drives = limits.steady_drives or (0.0,) * count
     bands = np.reshape(limits.steady_motion_bands or NO_DRIVE * count, (-1, BANDS))
     spectra = limits.steady_paces, limits.steady_sizes, limits.steady_narrow
-    shapes = zip(*spectra, drives, strict=True)
+    motions = zip(*spectra, drives, strict=True)
     windows = (
         limits.steady_shorts, limits.steady_mediums, limits.steady_frictions, limits.steady_onsets,
     )  # fmt: skip
     unknown = (np.inf,) * count
     extremes = zip(limits.steady_energies, *(each or unknown for each in windows), strict=True)
-    for shape, largest, own in zip(shapes, extremes, bands, strict=True):
-        yield Motion(*shape, Extremes(*largest), tuple(own.tolist()))
+    skews = np.reshape(limits.steady_skews or (np.nan,) * 3 * count, (-1, 3))
+    for spectrum, largest, own, skew in zip(motions, extremes, bands, skews, strict=True):
+        yield Motion(*spectrum, Extremes(*largest), tuple(own.tolist()), Shape(*skew.tolist()))
+
+
+def _shape_of(smooth: Spectrum) -> Shape:
+    """The shape of a recorded motion, and what it usually varies by."""
+    skew, rate = float(np.median(smooth.skew)), float(np.median(smooth.skew_rate))
+    off = np.hypot(smooth.skew - skew, smooth.skew_rate - rate)
+    return Shape(skew, rate, float(np.median(off)))
+
+
+def _reshaped(
+    seen: Spectrum, slope: FloatArray, at: NDArray[np.bool_], healthy: Shape
+) -> FloatArray:
+    """Deviation of a motion's shape from the recorded one, 1 at its limit; 0 if that is not known.
+
+    Args:
+        seen: the motion.
+        slope: relative difference that a faster drive may make, shape (compared samples,).
+        at: the samples that are compared, shape (n,).
+        healthy: the recorded one.
+    """
+    if np.isnan(healthy.spread):
+        return np.zeros(slope.size)
+    off = np.hypot(seen.skew[at] - healthy.skew, seen.skew_rate[at] - healthy.skew_rate)
+    allowed = (SHIFTED_SHAPE + slope) * np.hypot(healthy.skew, healthy.skew_rate)
+    return np.asarray(off / (allowed + VARIES * healthy.spread + FAINT))
 
 
 def _driven(bands: FloatArray, motion: Motion) -> NDArray[np.bool_]:

@@ -119,7 +119,8 @@ class ObserverMonitor:
         usual = self._usual.update(motion, seen.drive, seen.bands)
         decide(
             seen.judged, speed, grown, drive, inside, np.asarray(jumped.any(axis=1)),
-            steady, usual.extremes, usual.response, seen.state, self.rules, self._state, out,
+            steady, usual.extremes, usual.response, usual.altered, seen.state, self.rules,
+            self._state, out,
         )  # fmt: skip
         conditions = self._conditions(admitted, seen, far, out)
         sensors = (*self._jump_conditions(admitted, jumped, out), *self._clipping.update(admitted))

@@ -39,7 +39,7 @@ def watched(
     yes, no, out = np.ones(n, np.bool_), np.zeros(n, np.bool_), np.zeros((len(d.OUTPUTS), n))
     decide(
         judged, speed, np.zeros((n, 1)), np.ones(n), yes, no, yes,
-        np.tile(np.array(usual)[:, None], n), np.zeros(n), state, RULES, new_state(1), out,
+        np.tile(np.array(usual)[:, None], n), *np.zeros((2, n)), state, RULES, new_state(1), out,
     )  # fmt: skip
     assert out[d.MODE, BEGIN] == d.JUDGING
     return out

@@ -27,7 +27,8 @@ def departs(read_wrongly: float, fault: float, jitters: float) -> bool:
     zeros, out = np.zeros(N, np.bool_), np.zeros((len(d.OUTPUTS), N))
     decide(
         judged, np.ones(N), np.zeros((N, 1)), np.ones(N), ~zeros, zeros, ~zeros,
-        np.full((len(Extremes._fields), N), np.inf), np.zeros(N), state, RULES, new_state(1), out,
+        np.full((len(Extremes._fields), N), np.inf), *np.zeros((2, N)), state, RULES,
+        new_state(1), out,
     )  # fmt: skip
     assert not out[d.DEPARTED, :BEGIN].any()
     assert out[d.MODE, BEGIN] == d.JUDGING

@@ -18,7 +18,7 @@ CHIRP = np.geomspace(2.0, 16.0, 10 * N)
 
 def moved(pace: float | np.ndarray, size: float = 3.0, narrow: float = 0.95) -> Spectrum:
     ones = np.ones(np.size(pace)) if np.ndim(pace) else np.ones(N)
-    return Spectrum(narrow * ones, pace * ones, size * ones)
+    return Spectrum(narrow * ones, pace * ones, size * ones, 0.0 * ones, 0.0 * ones)
 
 
 def known() -> RangeSection:
@@ -73,7 +73,7 @@ def test_a_long_recording_is_compared_in_little_memory() -> None:
         known(), drive_paces=tuple(paces.tolist()), motion_paces=tuple(frequencies.tolist())
     )
     drive, pace = random.uniform(0.5, 40.0, (2, n))
-    motion = Spectrum(np.ones(n), pace, np.ones(n))
+    motion = Spectrum(np.ones(n), pace, np.ones(n), np.zeros(n), np.zeros(n))
     tracemalloc.start()
     try:
         found = DrivesSeen(seen).distance(motion, drive)

@@ -36,7 +36,7 @@ def recording(seed: int) -> HealthyPart:
     judged[:, DISAGREE], judged[:, MEASURED] = 0.1, SPEED
     none = np.zeros(0)
     return HealthyPart(
-        judged, SPEED, np.zeros((N, 1)), np.ones(N), np.full(N, WHOLE), Spectrum(none, none, none),
+        judged, SPEED, np.zeros((N, 1)), np.ones(N), np.full(N, WHOLE), Spectrum(*[none] * 5),
         none, np.zeros((0, BANDS)),
     )  # fmt: skip
 

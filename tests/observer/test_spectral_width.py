@@ -188,7 +188,7 @@ BANDS_OF_8_HZ = (0.0, 0.1, 0.3, 0.1, 0.0, 0.0, 0.0)
 )
 def test_a_motion_that_drifts_is_known_by_its_drive(drift, volts, expected) -> None:
     seen = spectrum(8.0)
-    recorded = Spectrum(DRIFT[512:], 8.5 * DRIFT[512:], seen.size[512:])
+    recorded = Spectrum(DRIFT[512:], 8.5 * DRIFT[512:], *(each[512:] for each in seen[2:]))
     bands = BANDS_OF_8_HZ
     motion = steady_motion(recorded, driven(recorded), Extremes(KNOWN), RATE, bands)
     assert motion is not None
@@ -271,6 +271,7 @@ def without_lasting() -> RigModel:
         healthy, steady_paces=(), steady_sizes=(), steady_narrow=(), steady_drives=(),
         steady_energies=(), steady_motion_bands=(),
         steady_shorts=(), steady_mediums=(), steady_frictions=(), steady_onsets=(),
+        steady_skews=(),
     )  # fmt: skip
     return structs.replace(model(), healthy=bare)
 

@@ -45,7 +45,8 @@ def watched(missing: FloatArray, speed: FloatArray, driven: FloatArray) -> Float
     yes, no, out = np.ones(N, np.bool_), np.zeros(N, np.bool_), np.zeros((len(d.OUTPUTS), N))
     decide(
         judged, speed, np.zeros((N, 1)), np.ones(N), no, no, yes,
-        np.full((len(Extremes._fields), N), np.inf), np.zeros(N), state, RULES, new_state(1), out,
+        np.full((len(Extremes._fields), N), np.inf), *np.zeros((2, N)), state, RULES,
+        new_state(1), out,
     )  # fmt: skip
     assert (out[d.MODE, 512:] == d.BEYOND).all()
     return out

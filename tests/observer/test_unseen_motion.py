@@ -69,8 +69,8 @@ def test_limits_grow_only_where_the_motion_was_not_recorded(usual: float, ratio:
         out = np.zeros((len(d.OUTPUTS), n))
         decide(
             judged.copy(), np.ones(n), levels, np.ones(n), ~zeros, zeros, ~zeros,
-            np.full((len(Extremes._fields), n), usual), np.zeros(n), state, rules, new_state(1),
-            out,
+            np.full((len(Extremes._fields), n), usual), *np.zeros((2, n)), state, rules,
+            new_state(1), out,
         )  # fmt: skip
         deviations.append(out[d.DEVIATION, -1])
         assert friction_limit(np.array([np.inf, 1.0]), rules)[1] == pytest.approx(1.6)
@@ -98,7 +98,8 @@ def test_a_new_residual_at_a_motion_that_is_known_is_a_departure_at_once(
     rules = RULES._replace(short=2.56, medium=2.56, unseen=1.0)
     decide(
         judged, np.ones(n), levels, np.ones(n), ~zeros, zeros, ~zeros,
-        np.full((len(Extremes._fields), n), usual), np.zeros(n), state, rules, new_state(1), out,
+        np.full((len(Extremes._fields), n), usual), *np.zeros((2, n)), state, rules,
+        new_state(1), out,
     )  # fmt: skip
 
     departed = np.flatnonzero(out[d.DEPARTED])

@@ -34,7 +34,7 @@ def verdict(
     ones, zeros, out = np.ones(n, np.bool_), np.zeros(n, np.bool_), np.zeros((len(d.OUTPUTS), n))
     decide(
         judged, speed, np.zeros((n, 1)), np.ones(n), ones, zeros, ones,
-        np.full((len(Extremes._fields), n), np.inf), np.zeros(n), state, rules, kept, out,
+        np.full((len(Extremes._fields), n), np.inf), *np.zeros((2, n)), state, rules, kept, out,
     )  # fmt: skip
     return float(out[d.VERDICT, -1])
 

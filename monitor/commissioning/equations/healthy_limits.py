@@ -120,6 +120,7 @@ def healthy_limits(
         steady_mediums=tuple(motion.extremes.medium for motion in steady),
         steady_frictions=tuple(motion.extremes.friction for motion in steady),
         steady_onsets=tuple(motion.extremes.onset for motion in steady),
+        steady_skews=tuple(figure for motion in steady for figure in motion.shape),
     )  # fmt: skip
 
 
@@ -186,11 +187,11 @@ def _tried(part: HealthyPart, rules: DecisionRules) -> FloatArray:
     inside, steady, jumped = np.ones((3, len(part.state)), np.bool_)
     jumped[:] = False
     usual = np.full((len(Extremes._fields), len(part.state)), np.inf)
-    response = np.zeros(len(part.state))
+    response = altered = np.zeros(len(part.state))
     kept = new_state(part.levels.shape[1])
     decide(
         part.judged, part.speed, part.levels, part.drive, inside, jumped, steady, usual,
-        response, part.state, rules, kept, out,
+        response, altered, part.state, rules, kept, out,
     )  # fmt: skip
     out[SPREAD] = np.maximum(out[SPREAD], rules.noise)
     return out
