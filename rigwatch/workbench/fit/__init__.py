@@ -5,7 +5,6 @@ from rigwatch.workbench.fit.another_start import (
     begun_from_larger,
     only_noise_left,
 )
-from rigwatch.workbench.fit.continued_error import continued_train_error
 from rigwatch.workbench.fit.fitted import Fitted, block_differences, error_text
 from rigwatch.workbench.fit.fitted_model import (
     eigenvalues,
@@ -47,10 +46,12 @@ from rigwatch.workbench.fit.intervals import (
     values,
 )
 from rigwatch.workbench.fit.profile import profile
+from rigwatch.workbench.fit.training import TrainingPart, continued_train_error, part_of
 
 __all__ = [
     "NO_INFLUENCE",
     "Fitted",
+    "TrainingPart",
     "Value",
     "as_written",
     "begun_from_given",
@@ -74,6 +75,7 @@ __all__ = [
     "may_hide_slow",
     "nodes",
     "only_noise_left",
+    "part_of",
     "placements_of",
     "poorly_determined",
     "profile",

@@ -199,19 +199,21 @@ def fit_model(
 
 
 def trained(
-    study: Study, data: Data, placement: Placement, start: Mapping[str, float], base: Fitted
+    study: Study,
+    data: Data,
+    placements: tuple[Placement, ...],
+    start: Mapping[str, float],
+    base: Fitted,
 ) -> Fitted:
-    """`fit_model` with a further effect, without a judgement: held out is what it was fitted to.
+    """`fit_model` without a judgement: held out is what it was fitted to.
 
     Args:
-        study, data, start: as in `fit_model`.
-        placement: the effect.
-        base: a fit with the other effects.
+        study, data, placements, start: as in `fit_model`.
+        base: a fit with the same effects or fewer.
 
     Raises:
         ModelError: an effect does not fit its port, or the simulation diverged (NaN or infinite).
     """
-    placements = (*base.placements, placement)
     found, _, horizon = _trained(study, data, placements, start, base.train.scale, base)
     return Fitted(placements, found, found, study.file.substeps, horizon)
 

@@ -103,7 +103,8 @@ def _begin_again(  # noqa: PLR0917 -- they belong together
 ) -> None:
     """Begin the best rows once more from the given values, until one leaves only noise.
 
-    All have begun where the base model ended.
+    All have begun where the base model ended. Those that an earlier ranking has begun again are not
+    fitted a third time.
     """
     tried = set[str]()
     for _ in range(BEGUN_AGAIN):
@@ -111,9 +112,11 @@ def _begin_again(  # noqa: PLR0917 -- they belong together
         waiting = [row for row in fitted if row.label not in tried]
         if not waiting or leaves_only_noise(study, data, floor, fitted[0]):
             return
-        progress(f"fitting {waiting[0].label} again, starting from the given values")
-        tried.add(waiting[0].label)
-        refit_from_given(study, data, base, waiting[0])
+        row = waiting[0]
+        tried.add(row.label)
+        if not row.begun_again:
+            progress(f"fitting {row.label} again, starting from the given values")
+            refit_from_given(study, data, base, row)
 
 
 def _fit_skipped(  # noqa: PLR0917 -- they belong together

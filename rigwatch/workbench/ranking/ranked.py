@@ -39,6 +39,7 @@ class Ranked:
         failure: why its fit failed, or why it cannot be what is missing; empty otherwise.
         fitted_instead: label of the similar effect fitted in its place; empty if there is none.
         vague: whether it is refused as the training does not determine its strength.
+        begun_again: whether its fit has also been begun from the model's given values.
     """
 
     placement: Placement
@@ -56,6 +57,7 @@ class Ranked:
     failure: str = ""
     fitted_instead: str = ""
     vague: bool = False
+    begun_again: bool = False
     p_alone: float = 1.0
     likely: bool = False
 
@@ -83,6 +85,7 @@ class Ranked:
         """Store the fit of another row of the same effect, and its decision."""
         self.fitted, self.gain, self.accepted = other.fitted, other.gain, other.accepted
         self.reason, self.failure, self.vague = other.reason, other.failure, other.vague
+        self.begun_again = other.begun_again
 
     def begin(self, share: float = 1.0) -> dict[str, float]:
         """Initial values of its fit, by the system's names, at a share of its strength."""

@@ -181,6 +181,7 @@ def refit_elsewhere(
 def refit_from_given(study: Study, data: Data, base: Fitted, row: Ranked) -> None:
     """Begin a fitted row once more from the model's given values; the better fit is kept."""
     assert row.fitted is not None
+    row.begun_again = True
     again = begun_from_given(study, data, row.fitted)
     if again is not row.fitted:
         row.fitted = again

@@ -1,21 +1,21 @@
-"""The part of long recordings on which a search tries sets of effects."""
+"""The part of long recordings on which sets of effects and delays of inputs are tried."""
 
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from rigwatch.physics.engine.fit import evaluate
 from rigwatch.workbench.compare import Bench, open_bench
-from rigwatch.workbench.explain.sets.training_part import (
-    STRETCH,
-    TrainingPart,
-    _stretches,
-    part_of,
-    tried,
-)
+from rigwatch.workbench.data import Data
+from rigwatch.workbench.explain.sets.part_trial import tried
+from rigwatch.workbench.fit import Fitted, TrainingPart, fit_model, part_of
+from rigwatch.workbench.fit.input_hold import hold_trials
+from rigwatch.workbench.fit.training.training_part import STRETCH, _stretches
 from rigwatch.workbench.ranking import candidates, refit, scored
+from rigwatch.workbench.study import Study
 from tests.workbench.machine import Table, studied
 
 ROTOR = """
@@ -35,21 +35,35 @@ UNSEEN = ROTOR.replace("(torque", "(coupling").replace(
 )  # fmt: skip
 """Its torque comes through a coupling whose own torque no channel shows."""
 UNITS = {"torque": "N m", "speed": "rad/s"}
+OPEN = ROTOR.replace('hold = "zero"\n', "")
+"""What its torque does between samples is chosen from the recordings."""
 J, B, COULOMB, DT, FINER = 0.03, 0.02, 0.05, 0.01, 20
 
 
-def log(seconds: float, seed: int, tau: float = 0.0) -> Table:
-    """A rotor with Coulomb friction that stops it exactly, in small Euler steps."""
+def log(
+    seconds: float,
+    seed: int,
+    tau: float = 0.0,
+    *,
+    late: float = 0.0,
+    coulomb: float = COULOMB,
+    steady: int = 25,
+) -> Table:
+    """A rotor with Coulomb friction that stops it exactly, in small Euler steps.
+
+    Each torque is kept for some samples, and acts from a part `late` of the first on.
+    """
     generator = np.random.default_rng(seed)
     count = round(seconds / DT)
-    torque = np.repeat(generator.uniform(-0.4, 0.4, count // 25 + 1), 25)[:count]
+    torque = np.repeat(generator.uniform(-0.4, 0.4, count // steady + 1), steady)[:count]
     speed, w, driven = np.empty(count), 0.0, 0.0
     for k in range(count):
         speed[k] = w
-        for _ in range(FINER):
-            driven += DT / FINER * (torque[k] - driven) / tau if tau else torque[k] - driven
+        for step in range(FINER):
+            acting = torque[max(k - 1, 0)] if step < late * FINER else torque[k]
+            driven += DT / FINER * (acting - driven) / tau if tau else acting - driven
             free = w + DT / FINER * (driven - B * w) / J
-            w = np.sign(free) * max(abs(free) - DT / FINER * COULOMB / J, 0.0)
+            w = np.sign(free) * max(abs(free) - DT / FINER * coulomb / J, 0.0)
     return {"torque": torque, "speed": speed + 0.01 * generator.standard_normal(count)}
 
 
@@ -65,7 +79,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
 
 @pytest.fixture(scope="module")
 def part(bench: Bench) -> TrainingPart:
-    found = part_of(bench)
+    found = part_of(bench.study, bench.data)
     assert found is not None
     return found
 
@@ -84,7 +98,8 @@ def test_stretches_take_a_share_of_every_recording(counts: list[int], factor: in
 
 
 def test_short_recordings_are_used_whole(tmp_path: Path) -> None:
-    assert part_of(opened(tmp_path, 20)) is None
+    bench = opened(tmp_path, 20)
+    assert part_of(bench.study, bench.data) is None
 
 
 def test_a_fit_on_the_part_is_what_a_simulation_of_the_part_gives(
@@ -118,8 +133,31 @@ def test_hidden_states_that_run_on_are_taken_on_the_part_as_well(tmp_path: Path)
     study = studied(tmp_path, UNSEEN, train, [log(20, 9, 0.1)], UNITS, "horizon = 0.5")
     bench = open_bench(study)
     assert bench.base.train.continued
-    part = part_of(bench)
+    part = part_of(bench.study, bench.data)
     assert part is not None
     own = part.of(bench.base)
     rows = scored(bench.study, part.data, own, candidates(bench.study, bench.data.train))
     assert min(rows, key=lambda row: row.p_value).effect == "coulomb"
+
+
+@pytest.mark.parametrize(("late", "coulomb"), [(0.0, COULOMB), (0.4, 0.0)])
+def test_delays_of_inputs_are_sought_on_the_part(
+    late: float, coulomb: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lengths: list[int] = []
+
+    def counted(study: Study, data: Data, *given: Any, **more: Any) -> Fitted:
+        lengths.append(len(data.train))
+        return fit_model(study, data, *given, **more)
+
+    monkeypatch.setattr(hold_trials, "fit_model", counted)
+    logs = [
+        log(length, seed, late=late, coulomb=coulomb, steady=3)
+        for seed, length in enumerate((40, 20, 10))
+    ]
+    study = studied(tmp_path, OPEN, logs[:2], logs[2:], UNITS, "horizon = 0.5")
+    held = open_bench(study).study.holds["torque"]
+    assert held.hold == "zero"
+    assert held.late == pytest.approx(late, abs=0.02)
+    # With lines, and held without delay; a delay that the part shows is refined on the whole.
+    assert len(lengths) <= (10 if late else 2)

@@ -7,7 +7,7 @@ import pytest
 
 from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.explain import explain
-from rigwatch.workbench.fit.continued_error import continued_train_error
+from rigwatch.workbench.fit.training import continued_train_error
 from rigwatch.workbench.steps.change import add, learn
 from rigwatch.workbench.steps.trial import try_effect
 from rigwatch.workbench.study.study_file import Accepted

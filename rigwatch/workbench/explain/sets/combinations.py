@@ -6,7 +6,7 @@ error selects the sets that are extended, so the held-out recordings are used on
 It is that of states of effects which run through all windows, as on held-out recordings: fitted
 window by window, they are a free constant each, and such a set leaves no place for others.
 The search ends when a set reduces the residual to noise. Of long recordings, effects are scored and
-sets first fitted on a part (`training_part`).
+sets first fitted on a part (`part_trial`).
 """
 
 from collections.abc import Collection, Iterator, Sequence

@@ -14,8 +14,8 @@ from rigwatch.workbench.explain.sets.combination import (
     combination_of,
     with_rows,
 )
-from rigwatch.workbench.explain.sets.training_part import Trial, part_of, tried
-from rigwatch.workbench.fit import Fitted, fit_model
+from rigwatch.workbench.explain.sets.part_trial import Trial, tried
+from rigwatch.workbench.fit import Fitted, TrainingPart, fit_model, part_of
 from rigwatch.workbench.ranking import (
     MATERIAL,
     Fitting,
@@ -58,12 +58,17 @@ class Larger:
         return self.trial.error if self.trial else 0.0
 
 
+def _part(bench: Bench) -> TrainingPart | None:
+    """The part of the training on which sets are tried; None if it is short."""
+    return part_of(bench.study, bench.data)
+
+
 def all_tried(bench: Bench, waiting: Sequence[tuple[Combination, Ranked]]) -> list[Larger]:
     """Sets with another effect each, fitted to a part of the training if that is long.
 
     Without those that cannot be fitted.
     """
-    part = part_of(bench)
+    part = _part(bench)
     if part is None:
         return [Larger(*each) for each in waiting]
 
@@ -78,7 +83,7 @@ def all_tried(bench: Bench, waiting: Sequence[tuple[Combination, Ranked]]) -> li
 
 def most_promising(bench: Bench, waiting: Sequence[Larger]) -> list[Larger]:
     """Those that leave least of a part of the training; all if they were not fitted to one."""
-    if part_of(bench) is None:
+    if _part(bench) is None:
         return list(waiting)
     lower = [
         each for each in waiting if each.error <= (1 - MATERIAL) * error_on_part(bench, each.known)
@@ -92,7 +97,7 @@ def most_promising(bench: Bench, waiting: Sequence[Larger]) -> list[Larger]:
 def error_on_part(bench: Bench, known: Combination) -> float:
     """Error of a set on a part of the training, computed once; infinite if it is not known."""
     if known.fitted not in _ON_PART:
-        part = part_of(bench)
+        part = _part(bench)
         try:
             _ON_PART[known.fitted] = part.error(known.fitted) if part else math.inf
         except ModelError:
@@ -118,7 +123,7 @@ def _enlarged(bench: Bench, larger: Larger) -> Combination | None:
 def scored_with(bench: Bench, known: Combination) -> list[Ranked]:
     """All other effects, scored with a set in the model; computed once for each fit."""
     if known.fitted not in _SCORED:
-        study, part = with_rows(bench.study, known.rows), part_of(bench)
+        study, part = with_rows(bench.study, known.rows), _part(bench)
         found = candidates(study, bench.data.train)
         if part is None:
             _SCORED[known.fitted] = scored(study, bench.data, known.fitted, found)

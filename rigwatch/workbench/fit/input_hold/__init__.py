@@ -1,7 +1,8 @@
 """The hold of inputs between samples, chosen from the data if neither model nor study gives it.
 
 seen_held.py      whether the samples themselves show that inputs are held
-hold_trials.py    models fitted with each hold, and which of them explains most
+hold_trials.py    models fitted with each hold, and whether one explains more than another
+best_hold.py      the hold that explains most, and its delay
 chosen_hold.py    the study with the hold that was chosen, with and without an effect in the model
 
 A D/A converter holds its value until the next update (zero-order hold); a measured signal varies

@@ -9,7 +9,6 @@ chosen can be asked, and the hold be chosen anew with an effect in the model.
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 
 from rigwatch.physics.engine.equations import Placement
 from rigwatch.wire.arrays import FloatArray
@@ -17,7 +16,8 @@ from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, parameters_of, quiet_scale
 from rigwatch.workbench.fit.fitted import Fitted
 from rigwatch.workbench.fit.fitted_model import placements_of
-from rigwatch.workbench.fit.input_hold.hold_trials import Tried, best_hold, tried, with_holds
+from rigwatch.workbench.fit.input_hold.best_hold import best_hold
+from rigwatch.workbench.fit.input_hold.hold_trials import HoldTrials, Tried, with_holds
 from rigwatch.workbench.fit.input_hold.seen_held import seen_held
 from rigwatch.workbench.study import HEALTHY, RECORDINGS, Held, Study
 
@@ -43,10 +43,10 @@ def with_hold(study: Study, data: Data, scale: FloatArray | None = None) -> Stud
     placements = () if data.healthy is not None else placements_of(study, data.train)
     # The healthy recording is modelled without the accepted effects.
     start = parameters_of(study.file) if placements else dict(study.file.start)
-    try_one = partial(tried, study, source_data, placements, scale)
-    line = try_one("linear", 0.0, start, None)
+    trials = HoldTrials(study, source_data, placements, scale)
+    line = trials.fitted("linear", 0.0, start, None)
     noise = quiet_scale(source_data.train) if scale is None else scale
-    best = best_hold(study, source_data, try_one, line, noise)
+    best = best_hold(trials, line, noise)
     source = HEALTHY if data.healthy is not None else RECORDINGS
     return _held_as_chosen(study, source_data, line, best, source)
 
@@ -79,19 +79,16 @@ def with_hold_beside(
     """
     free = _with_holds_open(study, _from_recordings(study))
     start = base.train.values()
-    lines = list[tuple[Placement, Tried]]()
+    lines = list[tuple[HoldTrials, Tried]]()
     for placement in beside:
+        trials = HoldTrials(free, data, (*base.placements, placement), base.train.scale)
         with suppress(ModelError):
-            line = tried(
-                free, data, (*base.placements, placement), base.train.scale,
-                "linear", 0.0, start, base,
-            )  # fmt: skip
-            lines.append((placement, line))
+            lines.append((trials, trials.fitted("linear", 0.0, start, base)))
     if not lines:
         raise ModelError("the model cannot be fitted with something slow at any port")
-    placement, line = min(lines, key=lambda pair: pair[1].size)
-    try_one = partial(tried, free, data, (*base.placements, placement), base.train.scale)
-    best = best_hold(free, data, try_one, line, quiet_scale(data.train))
+    trials, line = min(lines, key=lambda pair: pair[1].size)
+    best = best_hold(trials, line, quiet_scale(data.train))
+    placement = trials.placements[-1]
     label = f"{placement.name}@{placement.port}"
     return label, _held_as_chosen(free, data, line, best), best.fitted
 

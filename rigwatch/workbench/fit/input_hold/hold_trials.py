@@ -8,31 +8,22 @@ training: recordings that contradict each other show another defect of the model
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from msgspec import structs
-from scipy.optimize import minimize_scalar
 
 from rigwatch.physics.engine.equations import Hold, Model, Placement
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit.fitted import Fitted, block_differences, block_errors
-from rigwatch.workbench.fit.fitted_model import fit_model
-from rigwatch.workbench.fit.input_hold.seen_held import seen_held
+from rigwatch.workbench.fit.fitted_model import fit_model, trained
+from rigwatch.workbench.fit.training import TrainingPart
 from rigwatch.workbench.study import Study
 
 BEYOND_CHANCE = 3.0
 """Standard deviations by which the error must fall."""
 MATERIAL = 0.01
 """Relative fall of the squared error that is required."""
-AT_NOISE = 1.03
-"""Ratio of error to sensor noise below which no delay is searched for."""
-DELAYS = (0.25, 0.5, 0.75, 1.0)
-"""Delays tried before the best is refined, as shares of a sample."""
-FINE = 5e-4
-"""Resolution of the delay, as a share of a sample."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,71 +56,61 @@ def with_holds(model: Model, holds: Mapping[str, tuple[Hold | None, float]]) -> 
     return structs.replace(model, inputs=inputs)
 
 
-def tried(  # noqa: PLR0917 -- they belong together
-    study: Study,
-    data: Data,
-    placements: tuple[Placement, ...],
-    scale: FloatArray | None,
-    hold: Hold,
-    late: float,
-    start: Mapping[str, float],
-    base: Fitted | None,
-) -> Tried:
-    """The model fitted with a hold, and with some effects.
+@dataclass(frozen=True, eq=False)
+class HoldTrials:
+    """Fits of a model with some effects that differ in the hold of its inputs.
 
-    Args:
+    Attributes:
         study, data: with inputs that have no hold yet.
         placements: the effects.
         scale: divisor of each output's residuals, shape (outputs,).
-        hold, late: the hold, and its delay as a share of a sample.
-        start: initial values.
-        base: a fit to start from; None for a search from several starts.
-
-    Raises:
-        ModelError: it cannot be fitted.
     """
-    model = with_holds(study.model, dict.fromkeys(study.model.unheld(), (hold, late)))
-    fitted = fit_model(
-        replace(study, model=model), data, placements, start, scale,
-        base=base, multi_start=base is None,
-    )  # fmt: skip
-    return Tried(hold, late, fitted)
 
+    study: Study
+    data: Data
+    placements: tuple[Placement, ...]
+    scale: FloatArray | None
 
-def best_hold(
-    study: Study, data: Data, try_one: "partial[Tried]", line: Tried, noise: FloatArray
-) -> Tried:
-    """The best hold; a line is tried."""
-    kept = try_one("zero", 0.0, line.fitted.train.values(), line.fitted)
-    seen = seen_held(study, data)
-    best = kept if seen or explains_more(kept.fitted, line.fitted) else line
-    if data.along_motion or _at_noise(best, noise):
-        return best
-    late = _refined(partial(try_one, "zero"), kept)
-    return late if late is not None and explains_more(late.fitted, best.fitted) else best
+    def fitted(
+        self, hold: Hold, late: float, start: Mapping[str, float], base: Fitted | None
+    ) -> Tried:
+        """The model fitted with a hold.
 
+        Args:
+            hold, late: the hold, and its delay as a share of a sample.
+            start: initial values.
+            base: a fit to start from; None for a search from several starts.
 
-def _refined(try_late: "partial[Tried]", kept: Tried) -> Tried | None:
-    """The best delay; None if no fit succeeds."""
-    start, found = kept.fitted.train.values(), dict[float, Tried]()
+        Raises:
+            ModelError: it cannot be fitted.
+        """
+        fitted = fit_model(
+            self._held(hold, late), self.data, self.placements, start, self.scale,
+            base=base, multi_start=base is None,
+        )  # fmt: skip
+        return Tried(hold, late, fitted)
 
-    def size(late: float) -> float:
-        late = float(late)
-        try:
-            found[late] = try_late(late, start, kept.fitted)
-        except ModelError:
-            return float("inf")
-        return found[late].size
+    def on_part(
+        self, part: TrainingPart, hold: Hold, late: float, start: Mapping[str, float], base: Fitted
+    ) -> Tried:
+        """The same on a part of the training, not judged by other recordings.
 
-    sizes = [size(late) for late in DELAYS]
-    if not found:
-        return None
-    # If no coarse step improves the error, no fine one does.
-    if min(sizes) < kept.size:
-        near = DELAYS[int(np.argmin(sizes))]
-        ends = (max(near - 0.25, 1e-3), min(near + 0.25, 1.0))
-        minimize_scalar(size, bounds=ends, method="bounded", options={"xatol": FINE})
-    return min(found.values(), key=lambda one: one.size)
+        Args:
+            part: the part.
+            hold, late, start: as in `fitted`.
+            base: a fit to the part to start from.
+
+        Raises:
+            ModelError: it cannot be fitted.
+        """
+        held = self._held(hold, late)
+        return Tried(hold, late, trained(held, part.data, self.placements, start, base))
+
+    def _held(self, hold: Hold, late: float) -> Study:
+        model = self.study.model
+        return replace(
+            self.study, model=with_holds(model, dict.fromkeys(model.unheld(), (hold, late)))
+        )
 
 
 def _training_size(fitted: Fitted) -> float:
@@ -154,7 +135,3 @@ def explains_more(one: Fitted, other: Fitted) -> bool:
 
 def _blocks(fitted: Fitted) -> FloatArray:
     return block_errors(fitted.held_out)
-
-
-def _at_noise(tried: Tried, noise: FloatArray) -> bool:
-    return float(np.sqrt(np.mean((tried.fitted.train.rms / noise) ** 2))) < AT_NOISE

@@ -1,7 +1,8 @@
-"""The part of long training recordings on which sets of effects are tried.
+"""The part of long training recordings on which what is only tried is fitted.
 
-Most sets that a search tries lead nowhere. Each is fitted to a part first: stretches of adjacent
-windows, spread evenly over all recordings. Only the best are fitted to the whole.
+Most sets of effects that a search tries lead nowhere, and so do most delays of an input. Each is
+fitted to a part first: stretches of adjacent windows, spread evenly over all recordings. Only the
+best are fitted to the whole, which decides.
 """
 
 import math
@@ -11,17 +12,15 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from rigwatch.physics.engine.fit import Fit, Recording, of_parts, windows
+from rigwatch.physics.engine.fit import Fit, Recording, of_parts
 from rigwatch.wire.arrays import IntArray
-from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.data import Data
-from rigwatch.workbench.fit import Fitted, continued_train_error, trained
-from rigwatch.workbench.ranking import Order, Ranked, order_of, orders_at_port
+from rigwatch.workbench.fit.fitted import Fitted
+from rigwatch.workbench.fit.training.continued_error import continued_train_error
 from rigwatch.workbench.study import Study
 
 ENOUGH = 1500
-"""Samples that tell promising sets from others."""
+"""Samples that tell what is promising from what is not."""
 FEWEST = 16
 """Fewest windows of a part."""
 STRETCH = 8
@@ -59,70 +58,34 @@ class TrainingPart:
         return continued_train_error(self.of(fitted), self.data)
 
 
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """An effect fitted beside others to a part of the training.
-
-    Attributes:
-        error: on the part, with states of effects continued.
-        starts: parameters found, by the effect's place before or after others at its port.
-    """
-
-    error: float
-    starts: dict[Order, dict[str, float]]
-
-
-def part_of(bench: Bench) -> TrainingPart | None:
-    """The part for a study; None if its recordings are short or cannot be divided."""
-    if bench.data not in _PARTS:
-        _PARTS[bench.data] = _part(bench)
-    return _PARTS[bench.data]
-
-
-def tried(study: Study, part: TrainingPart, base: Fitted, row: Ranked) -> Trial | None:
-    """The effect of a row fitted to the part; None if it cannot be fitted.
+def part_of(study: Study, data: Data) -> TrainingPart | None:
+    """The part for a study; None if its recordings are short or cannot be divided.
 
     Args:
-        study: with the effects of `base` in its model.
-        part: of its training recordings.
-        base: fit of these effects to the whole training.
-        row: the effect.
+        study: what is fitted to whole recordings, as a constant of each, is the same in all studies
+            of the same data.
+        data: its recordings.
     """
-    base = part.of(base)
-    begin, found = base.train.values() | row.begin(), dict[Order, Fitted]()
-    for placement in orders_at_port(study, base, row):
-        try:
-            found[order_of(placement)] = trained(study, part.data, placement, begin, base)
-        except ModelError:
-            continue
-    errors = [error for each in found.values() if (error := _continued(each, part)) is not None]
-    if not errors:
-        return None
-    return Trial(min(errors), {order: each.train.values() for order, each in found.items()})
+    if data not in _PARTS:
+        _PARTS[data] = _part(study, data)
+    return _PARTS[data]
 
 
-def _continued(fitted: Fitted, part: TrainingPart) -> float | None:
-    try:
-        return continued_train_error(fitted, part.data)
-    except ModelError:
-        return None
-
-
-def _part(bench: Bench) -> TrainingPart | None:
-    data, whole = bench.data, bench.data.train
-    system = bench.base.compiled.system
+def _part(study: Study, data: Data) -> TrainingPart | None:
+    whole = data.train
     # Without states of its own a model has no windows, and some recordings must stay whole.
-    if not system.model.states or data.along_motion or whole.thinning or bench.study.moving():
+    if not study.model.states or data.along_motion or whole.thinning or study.moving():
         return None
-    cut = windows(system, len(whole), bench.base.horizon)
-    factor = len(cut.starts) // max(math.ceil(ENOUGH / cut.length), FEWEST)
+    length = min(data.horizon, len(whole))
+    starts = np.arange(0, len(whole) - length + 1, length)
+    factor = len(starts) // max(math.ceil(ENOUGH / length), FEWEST)
     if factor < 2:
         return None
-    stretches = list(_stretches(_counts(whole, cut.length, len(cut.starts)), factor))
+    stretches = list(_stretches(_counts(whole, length, len(starts)), factor))
     chosen = np.concatenate([np.arange(first, first + count) for first, count in stretches])
-    rows = (cut.starts[chosen][:, None] + np.arange(cut.length)).ravel()
-    parts = tuple(count * cut.length for _, count in stretches)
-    own = whole.spacing[cut.starts[[first for first, _ in stretches]]]
+    rows = (starts[chosen][:, None] + np.arange(length)).ravel()
+    parts = tuple(count * length for _, count in stretches)
+    own = whole.spacing[starts[[first for first, _ in stretches]]]
     dt, spacings = of_parts(own.tolist(), parts)
     train = replace(
         whole, dt=dt, inputs=whole.inputs[rows], outputs=whole.outputs[rows], parts=parts,
