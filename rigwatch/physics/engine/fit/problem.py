@@ -200,8 +200,8 @@ class Problem:
         Windows start from the channels' states or, if better, from the given ones; a recording that
         is one window and has no given ones starts, if better, from where its hidden states settle.
         """
-        self._set_effect_states(parameters, self._effect_states.columns)
         rows, own = np.arange(len(self.initial)), len(self.system.model.states)
+        self._set_effect_states(parameters, self._effect_states.columns, rows)
         if self._given_initial is not None and len(self._given_initial) == len(self.initial):
             other = np.column_stack([self._given_initial[:, :own], self.initial[:, own:]])
         elif len(self.hidden) and len(self.first_windows) == len(rows):
@@ -229,17 +229,21 @@ class Problem:
         return np.where(np.isfinite(found), found, self.initial)
 
     def follow_inputs(self, parameters: FloatArray) -> None:
-        """Initialise effect states at actuators from the inputs; the first window's are fitted."""
-        self._set_effect_states(parameters, self._effect_states.exact, since=1)
+        """Initialise effect states at actuators from the inputs.
+
+        Those of the first window of each recording are fitted: its inputs are unknown before.
+        """
+        later = np.setdiff1d(np.arange(len(self.starts)), self.first_windows)
+        self._set_effect_states(parameters, self._effect_states.exact, later)
 
     def _set_effect_states(
-        self, parameters: FloatArray, columns: list[int], since: int = 0
+        self, parameters: FloatArray, columns: list[int], rows: IntArray
     ) -> None:
         if columns and not self._cut.parts:
             states = self._effect_states.at(parameters)
             self.initial = self.initial.copy()
             for column in columns:
-                self.initial[since:, column] = states[column][self._cut.starts[since:]]
+                self.initial[rows, column] = states[column][self._cut.starts[rows]]
 
     def simulated(
         self, parameters: FloatArray, rows: IntArray, initial: FloatArray
@@ -438,8 +442,9 @@ class Problem:
         if self._told:
             every = np.arange(len(rows))
             return Tangent(slopes[..., len(self.free) :], [(every, self._unknown)])
-        first = np.nonzero(rows == 0)[0], np.nonzero(rows > 0)[0]
-        groups = list(zip(first, (self._every, self._unknown), strict=True))
+        first = np.isin(rows, self.first_windows)
+        apart = np.nonzero(first)[0], np.nonzero(~first)[0]
+        groups = list(zip(apart, (self._every, self._unknown), strict=True))
         if len(self._unknown) == len(self._every):
             groups = [(np.arange(len(rows)), self._every)]
         return Tangent(slopes[..., len(self.free) :], groups)

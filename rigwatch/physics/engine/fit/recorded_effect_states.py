@@ -32,7 +32,7 @@ class _PlacedStates:
 
     Attributes:
         placement: the effect.
-        states: its states, of each recording apart if they count from its beginning.
+        states: its states, of each recording apart.
         columns: their indices among the system's states.
         signals: at the port, before any effect there.
         before: effects applied to the signal first; their own states are neglected.
@@ -133,7 +133,7 @@ class RecordedEffectStates:
         for placement in (each for each in system.placements if each.effect.states):
             signals = port_signals(system, placement, inputs, states, spacing, values)
             port = system.model.ports[placement.entry]
-            apart = _divided(placement, parts)
+            apart = parts or [slice(None)]
             own = [
                 EffectStates(
                     placement.effect, {n: s[part] for n, s in signals.items()}, spacing[part],
@@ -163,9 +163,3 @@ class RecordedEffectStates:
             own = _own(placed.placement, values)
             found |= dict(zip(placed.columns, placed.run(own, values, self._spacing), strict=True))
         return found
-
-
-def _divided(placement: Placement, parts: Sequence[slice] | None) -> Sequence[slice]:
-    """The recordings apart if a state of the effect counts from their beginning."""
-    counts = any(state.known for state in placement.effect.states.values())
-    return parts if parts and counts else [slice(None)]
