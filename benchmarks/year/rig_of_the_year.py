@@ -77,6 +77,7 @@ class RigOfTheYear:
         self.rig, self.rate = rig, rate
         self.heard: list[dict[str, Any]] = []
         self.endings: list[dict[str, Any]] = []
+        self._answers, self._states = 0, dict[str, str]()
         self._status: dict[str, Any] = {}
         self._estimated_ns = 0.0
         self.clock = FastClock(rig.folder, int(BEGIN * 1e9), 1.0)
@@ -86,7 +87,7 @@ class RigOfTheYear:
         path = str(self.rig.path)
         words = ("-m", "rigwatch", "up", path, "--json", "--without", "dashboard")
         self._up = Lines(self._follow, env, *words)
-        self._room = Lines(self.heard.append, env, "-m", "benchmarks.year.control_room", path)
+        self._room = Lines(self._hear, env, "-m", "benchmarks.year.control_room", path)
         self._bus = connect(self.rig.config, "year", START_S)
         self._estimates = self._bus.subscribe_lossy(ESTIMATES, capacity=1)
         if not self.recovered():
@@ -132,9 +133,9 @@ class RigOfTheYear:
     def operate(self, *actions: str) -> None:
         """Let the operator act, and wait for the answers."""
         for action in actions:
-            before = self._answers()
+            before = self._answers
             self._room.say(action)
-            wait_until(lambda before=before: self._answers() > before, 10.0, 0.01)  # type: ignore[misc]
+            wait_until(lambda before=before: self._answers > before, 10.0, 0.01)  # type: ignore[misc]
 
     def alarms(self) -> Iterator[dict[str, Any]]:
         """Alarms in the order in which they were heard."""
@@ -142,8 +143,7 @@ class RigOfTheYear:
 
     def standing(self) -> dict[str, str]:
         """State of each alarm that is not normal, as the control room knows it."""
-        states = {one["name"]: one["state"] for one in self.alarms() if one["severity"] != "info"}
-        return {name: state for name, state in states.items() if state != "normal"}
+        return {name: state for name, state in dict(self._states).items() if state != "normal"}
 
     def lag_s(self) -> float:
         """Age of the newest estimate by the fast clock [s]."""
@@ -151,8 +151,13 @@ class RigOfTheYear:
             self._estimated_ns = float(block.t_ns[-1])
         return (self.clock.wall_ns() - self._estimated_ns) * 1e-9
 
-    def _answers(self) -> int:
-        return sum(one["kind"] == "answer" for one in list(self.heard))
+    def _hear(self, one: dict[str, Any]) -> None:
+        # Counted as they come: a year has too many to be looked through again and again.
+        self.heard.append(one)
+        if one["kind"] == "answer":
+            self._answers += 1
+        elif one["kind"] == "alarm" and one["severity"] != "info":
+            self._states[one["name"]] = one["state"]
 
     def _follow(self, event: dict[str, Any]) -> None:
         if event["event"] == "status":
