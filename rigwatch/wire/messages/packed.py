@@ -30,7 +30,7 @@ NO_QUALITY: ByteArray = np.zeros(0, np.uint8)
 _F8, _I8, _U1 = np.dtype("<f8"), np.dtype("<i8"), np.dtype("u1")
 LARGEST_GATHERED = 1 << 13
 """Largest block whose offsets are needed one by one [bytes]."""
-MOST_LAYOUTS, LAYOUTS_ROOM = 24, 1 << 16
+MOST_LAYOUTS, LAYOUTS_ROOM = 48, 1 << 16
 """Layouts kept in a generation, and the sum of their blocks' sizes [bytes].
 
 A live block has few lengths, but a busy machine makes some that hardly come again, and offsets take
