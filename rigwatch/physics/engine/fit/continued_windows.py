@@ -82,8 +82,7 @@ def _continued_from_previous(problem: Problem, parameters: FloatArray) -> FloatA
     own = set(problem.hidden[problem.hidden < len(problem.system.model.states)].tolist())
     effect_states = np.array([column for column in problem.hidden if column not in own], np.int64)
     initial = problem.initial.copy()
-    rest = np.setdiff1d(np.arange(len(initial)), problem.first_windows)
-    order = problem.window_order if len(effect_states) else [rest]
+    order = problem.window_order if len(effect_states) else [problem.later_windows]
     for rows in order:
         ended = problem.ends_before(parameters, rows)
         initial[rows] = ended

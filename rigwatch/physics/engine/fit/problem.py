@@ -152,6 +152,11 @@ class Problem:
         return np.asarray(first[first < len(self._cut.starts)], np.int64)
 
     @cached_property
+    def later_windows(self) -> IntArray:
+        """All windows but `first_windows`."""
+        return np.setdiff1d(np.arange(len(self.starts)), self.first_windows)
+
+    @cached_property
     def window_order(self) -> list[IntArray]:
         """Windows except the first of each recording: all second ones, then all third ones, …"""
         every = np.arange(len(self.starts))
@@ -233,8 +238,7 @@ class Problem:
 
         Those of the first window of each recording are fitted: its inputs are unknown before.
         """
-        later = np.setdiff1d(np.arange(len(self.starts)), self.first_windows)
-        self._set_effect_states(parameters, self._effect_states.exact, later)
+        self._set_effect_states(parameters, self._effect_states.exact, self.later_windows)
 
     def _set_effect_states(
         self, parameters: FloatArray, columns: list[int], rows: IntArray
@@ -439,14 +443,14 @@ class Problem:
 
     def _tangent(self, slopes: FloatArray, rows: IntArray) -> Tangent:
         """Projection of the unknown initial states; input-driven states are known later on."""
-        if self._told:
-            every = np.arange(len(rows))
-            return Tangent(slopes[..., len(self.free) :], [(every, self._unknown)])
-        first = np.isin(rows, self.first_windows)
-        apart = np.nonzero(first)[0], np.nonzero(~first)[0]
-        groups = list(zip(apart, (self._every, self._unknown), strict=True))
-        if len(self._unknown) == len(self._every):
-            groups = [(np.arange(len(rows)), self._every)]
+        if self._told or len(self._unknown) == len(self._every):
+            groups = [(np.arange(len(rows)), self._unknown)]
+        else:
+            first = np.isin(rows, self.first_windows)
+            groups = [
+                (np.nonzero(first)[0], self._every),
+                (np.nonzero(~first)[0], self._unknown),
+            ]
         return Tangent(slopes[..., len(self.free) :], groups)
 
     def projected(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:

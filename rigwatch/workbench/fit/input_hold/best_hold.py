@@ -75,7 +75,8 @@ def _best_delay(trials: HoldTrials, kept: Tried) -> Tried | None:
 def _part(trials: HoldTrials) -> TrainingPart | None:
     """The part of the training on which delays are tried; None if it has to be the whole.
 
-    What is slow in a drive begins each stretch of a part with a state that is not known there.
+    What is slow in a drive begins each stretch of a part with a state that is fitted there; whether
+    a delay beside it shows on a part has not been judged.
     """
     ports = trials.study.model.ports
     slow = [each for each in trials.placements if each.effect.states]

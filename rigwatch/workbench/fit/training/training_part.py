@@ -12,7 +12,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from rigwatch.physics.engine.fit import Fit, Recording, of_parts
+from rigwatch.physics.engine.equations import compose
+from rigwatch.physics.engine.fit import Fit, Recording, of_parts, windows
 from rigwatch.wire.arrays import IntArray
 from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit.fitted import Fitted
@@ -76,8 +77,8 @@ def _part(study: Study, data: Data) -> TrainingPart | None:
     # Without states of its own a model has no windows, and some recordings must stay whole.
     if not study.model.states or data.along_motion or whole.thinning or study.moving():
         return None
-    length = min(data.horizon, len(whole))
-    starts = np.arange(0, len(whole) - length + 1, length)
+    cut = windows(compose(study.model), len(whole), data.horizon)
+    starts, length = cut.starts, cut.length
     factor = len(starts) // max(math.ceil(ENOUGH / length), FEWEST)
     if factor < 2:
         return None
