@@ -236,7 +236,8 @@ class Narrator:
             self.explained = True
             found = event.text.rpartition("probably missing: ")[2]
             first, *more = in_lines(found)
-            self._say(f"            probably missing in the rig's model: {first}")
+            whose = self._whose(event)
+            self._say(f"            {whose}probably missing in the rig's model: {first}")
             for line in more:
                 self._say(f"              {line}")
             newest = next((a.name for a in self.alarms[::-1] if a.name in OF_THE_RIG), "")
@@ -250,6 +251,12 @@ class Narrator:
             if effect:
                 self._say(f"            more about it: $ rigwatch effects {effect[1]}")
                 self._tell_how_to_study(newest or ALARM, effect[1], effect[2])
+
+    def _whose(self, event: Event) -> str:
+        """Which alarm an explanation belongs to: others may have come since."""
+        name = event.text.partition(": ")[0]
+        alarm = next((one for one in self.alarms[::-1] if one.name == name), None)
+        return f"the alarm of {alarm.seq / self._rate:.2f} s: " if alarm else ""
 
     def _tell_how_to_study(self, alarm: str, effect: str, port: str) -> None:
         """Say how the effect's strength is found, and how the model gets it."""

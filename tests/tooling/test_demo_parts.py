@@ -233,6 +233,17 @@ def test_an_explanation_after_the_end_of_the_friction_tells_the_size_that_it_had
     assert any("measured friction: 0.44 N, 1.02 times" in line for line in said)
 
 
+def test_an_explanation_says_which_alarm_it_belongs_to() -> None:
+    said: list[str] = []
+    narrator = narrator_to(said)
+    narrator.alarm(alarm("departure", 20 * RATE))
+    narrator.alarm(alarm("dry_friction", 21 * RATE))
+    narrator.samples(96 * RATE)
+    text = "departure: probably missing: coulomb@load (dry surfaces resist sliding)"
+    narrator.explain(Event("monitor", 0, "error", PROBABLY_MISSING, text))
+    assert any("the alarm of 20.00 s: probably missing" in line for line in said)
+
+
 def test_what_is_missing_in_the_model_is_told_and_other_events_are_not() -> None:
     said: list[str] = []
     narrator = narrator_to(said)
