@@ -10,6 +10,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,8 @@ from rigwatch.wire.messages import (
     EstimateBlock,
     Event,
     SampleBlock,
+    concatenate,
+    continues,
 )
 
 NAMED = ("departure", "dry_friction", "other_fault")
@@ -36,6 +39,8 @@ WAIT = 2.0
 """Time from the onset to the ranking [s]."""
 KEPT = 20.0
 """Length of the buffered samples [s]."""
+JOINED = 256
+"""Samples that are joined into one block: in blocks as they come they need ten times the memory."""
 MAX_ANSWERS = 64
 """Number of answers kept for later listings of alarms."""
 Judged = tuple[EstimateBlock, SampleBlock]
@@ -52,6 +57,8 @@ class Explainer:
     def __init__(self, model: Callable[[], RigModel], effect_files: Sequence[str] = ()) -> None:
         self._model, self._files = model, tuple(effect_files)
         self._judged: deque[Judged] = deque()
+        self._loose: list[Judged] = []
+        self._boot: int | None = None
         self._wanted: Alarm | None = None
         self._friction: tuple[int, int] | None = None
         self._told: dict[tuple[int, int], str] = {}
@@ -64,20 +71,29 @@ class Explainer:
         """Keep estimates with the samples they are of, and ask where enough have come since an
         alarm's onset.
         """
-        if self._judged and self._judged[-1][0].boot != block.boot:
-            self._judged.clear()
-        self._judged.append((_needed(block), samples))
         rate, alarm = self._model().sample_rate, self._wanted
-        while self._judged[0][0].seq < block.seq - KEPT * rate:
-            self._judged.popleft()
+        self._keep(_needed(block), samples, rate)
         if not alarm or alarm.boot != block.boot or self._busy():
             return
         if block.seq + len(block) - alarm.onset_seq >= WAIT * rate:
             self._wanted = None
             force = _force(block) if self._friction == (alarm.boot, alarm.onset_seq) else 0.0
-            arguments = (list(self._judged), alarm, self._model(), force)
+            arguments = ([*self._judged, *self._loose], alarm, self._model(), force)
             self._thread = threading.Thread(target=self._rank, args=arguments, daemon=True)
             self._thread.start()
+
+    def _keep(self, block: EstimateBlock, samples: SampleBlock, rate: float) -> None:
+        """Buffer a block, drop what is too old, and all of an earlier boot."""
+        if block.boot != self._boot:
+            self._boot = block.boot
+            self._judged.clear()
+            self._loose.clear()
+        self._loose.append((block, samples))
+        if block.seq + len(block) - self._loose[0][0].seq >= JOINED:
+            self._judged += _joined(self._loose)
+            self._loose = []
+        while self._judged and self._judged[0][0].seq < block.seq - KEPT * rate:
+            self._judged.popleft()
 
     def hear(self, alarm: Alarm) -> None:
         """Request an explanation if an alarm needs one, once per onset."""
@@ -150,6 +166,14 @@ def _needed(block: EstimateBlock) -> EstimateBlock:
     change = block.column("change")
     kept = Column(change.name, change.unit, change.values.copy(), change.quality)
     return EstimateBlock(block.device, block.boot, block.seq, block.t_ns, (kept,))
+
+
+def _joined(judged: Sequence[Judged]) -> list[Judged]:
+    """The blocks as one, or as they are if something is missing between them."""
+    estimates, samples = [one for one, _ in judged], [one for _, one in judged]
+    if all(continues(*pair) for blocks in (estimates, samples) for pair in pairwise(blocks)):
+        return [(concatenate(estimates), concatenate(samples))]
+    return list(judged)
 
 
 def _arrays(judged: Sequence[Judged], channels: Sequence[str]) -> tuple[FloatArray, FloatArray]:

@@ -1,16 +1,19 @@
-"""A ranking in the background ends with its monitor, wherever it is."""
+"""A ranking in the background: what it gets, and how it ends with its monitor, wherever it is."""
 
+import gc
 import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from monitor.diagnosis import background_ranking, ranking_job
 from monitor.diagnosis.background_ranking import Explainer
 from monitor.diagnosis.child import Child
 from monitor.model import load_model
-from rigwatch.wire.messages.message_types import Alarm, Column, EstimateBlock
+from rigwatch.wire.messages.blocks import cut
+from rigwatch.wire.messages.message_types import Alarm, Column, EstimateBlock, SampleBlock
 from tests.bus.samples import block
 from tests.waiting import eventually
 
@@ -27,6 +30,40 @@ def explained(explainer: Explainer) -> None:
     change = (Column("change", "m/s^2", np.zeros(600)),)
     explainer.hear(ALARM)
     explainer.take(EstimateBlock("rig", 7, 0, samples.t_ns, change), samples)
+
+
+def blocks_in_memory() -> int:
+    return sum(isinstance(one, SampleBlock) for one in gc.get_objects())
+
+
+def test_a_ranking_gets_every_sample_and_few_blocks_wait_for_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    got: list[np.ndarray] = []
+    monkeypatch.setattr(
+        background_ranking, "ask", lambda _, *rest: got.extend(rest[:2]) or "an answer"
+    )
+    model = structs.replace(RIG, channels=("voltage", "position"))
+    explainer, whole, before = Explainer(lambda: model), block(0, 7 * 256), blocks_in_memory()
+
+    def take(seq: int) -> None:
+        samples = cut(whole, seq, seq + 7)
+        change = (Column("change", "m/s^2", np.arange(seq, seq + 7.0)),)
+        explainer.take(EstimateBlock("rig", 7, seq, samples.t_ns, change), samples)
+
+    for seq in (*range(0, 700, 7), *range(900, 1600, 7)):  # samples 700 to 899 are lost
+        take(seq)
+    assert blocks_in_memory() - before < 100
+    explainer.hear(ALARM)
+    take(1600)
+    eventually(explainer.results, "an answer")
+    present = np.r_[0:700, 900:1607]
+    expected = np.full(1607, np.nan)
+    expected[present] = present
+    np.testing.assert_array_equal(got[1], expected)
+    for place, name in enumerate(model.channels):
+        expected[present] = whole.channel(name).values[present]
+        np.testing.assert_array_equal(got[0][:, place], expected)
 
 
 def test_a_child_that_runs_is_killed_and_one_that_comes_late_never_starts(tmp_path: Path) -> None:
