@@ -1,13 +1,14 @@
 """What a reader remembers of sources stays the same however many there have been."""
 
 import pickle
+import tracemalloc
 from functools import partial
 
 import pytest
 
 from rigwatch.wire.bus import complete_subscription
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
-from rigwatch.wire.messages import ALARMS
+from rigwatch.wire.messages import ALARMS, SampleBlock, decode, encode
 from rigwatch.wire.ordering import Owners, SampleOrder
 from tests.bus.samples import block
 from tests.bus.test_complete_subscription import alarm
@@ -78,3 +79,16 @@ def test_a_process_that_starts_anew_every_day_fills_no_memory(
     listener.drain()
     assert heard == [0, 1, 2]
     assert len(listener._runs) == 0
+
+
+def test_encoding_the_blocks_of_hundreds_of_boots_fills_no_memory() -> None:
+    def encoded(boots: range) -> bytes:
+        return [encode(block(0, 4, boot=boot)) for boot in boots][-1]
+
+    encoded(range(1 << 40, (1 << 40) + FEW))
+    tracemalloc.start()
+    last = encoded(range(1 << 41, (1 << 41) + FEW))
+    grown, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert decode(SampleBlock, last).boot == (1 << 41) + FEW - 1
+    assert grown < 25 * FEW

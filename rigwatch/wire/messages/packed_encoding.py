@@ -45,7 +45,7 @@ def encode_block(block: Block) -> bytes:
         return encode(block)
     _, _, seq, *places = _TAGS[type(block)]
     parts = [
-        _source(samples, block.device, int(block.boot)),
+        _source(samples, block.device).head(int(block.boot)),
         _number(seq, int(block.seq)),
         *(_part(tag, one.tobytes()) for tag, one in zip(places[: 1 + samples], times, strict=True)),
     ]
@@ -56,11 +56,28 @@ def encode_block(block: Block) -> bytes:
     return b"".join(parts)
 
 
+class _Source:
+    """The bytes that all blocks of a boot begin with, of a device's newest boot: a year has
+    hundreds.
+    """
+
+    def __init__(self, samples: bool, device: str) -> None:
+        device_tag, self._boot_tag, *_ = _TAGS[SampleBlock if samples else EstimateBlock]
+        self._device = _part(device_tag, device.encode())
+        self._newest: tuple[int | None, bytes] = None, b""
+
+    def head(self, boot: int) -> bytes:
+        """Those of a boot."""
+        newest, head = self._newest
+        if newest != boot:
+            head = self._device + _number(self._boot_tag, boot)
+            self._newest = boot, head
+        return head
+
+
 @lru_cache(maxsize=LENGTHS_KEPT)
-def _source(samples: bool, device: str, boot: int) -> bytes:
-    """The bytes that all blocks of a boot begin with."""
-    device_tag, boot_tag, *_ = _TAGS[SampleBlock if samples else EstimateBlock]
-    return _part(device_tag, device.encode()) + _number(boot_tag, boot)
+def _source(samples: bool, device: str) -> _Source:
+    return _Source(samples, device)
 
 
 def _is_plain(block: Block, times: list[NDArray[np.int64]], columns: Sequence[Column]) -> bool:
