@@ -52,6 +52,7 @@ class FastClock:
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self.stood_s, self._late_since = 0.0, dict[int, float]()
+        self._niceness = os.getpriority(os.PRIO_PROCESS, 0)
         self._write()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -126,7 +127,7 @@ class FastClock:
             if pid and due < limit:
                 try:
                     # Nobody waits for work that lets others go first, as a search for a cause.
-                    if os.getpriority(os.PRIO_PROCESS, pid) <= 0:
+                    if os.getpriority(os.PRIO_PROCESS, pid) <= self._niceness:
                         late.append(pid)
                 except ProcessLookupError:
                     _SLOT.pack_into(self._page, at, 0, 0)
