@@ -13,12 +13,16 @@ from rigwatch.workbench.compare import (
 )
 from rigwatch.workbench.data import predicts_along_motion
 from rigwatch.workbench.explain.adequacy import (
+    cannot_tell,
     inadequate,
     stopped_by_outliers,
     unchecked,
+    unexcited,
     with_adequate_base,
     with_base_offered,
     with_change_told,
+    with_failure_told,
+    with_unjudged_told,
 )
 from rigwatch.workbench.explain.changed_parameters import undetermined_if_parameters_changed
 from rigwatch.workbench.explain.credibility import (
@@ -27,7 +31,6 @@ from rigwatch.workbench.explain.credibility import (
     unless_resampled,
 )
 from rigwatch.workbench.explain.exchange import Exchange, exchange
-from rigwatch.workbench.explain.excitation import cannot_tell, unexcited, with_unjudged_told
 from rigwatch.workbench.explain.explanation import STRENGTH_TOLD, Explanation, explanation
 from rigwatch.workbench.explain.lower_floor import with_lower_floor
 from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
@@ -363,8 +366,10 @@ def _by_pairs(bench: Bench, rows: list[Ranked], verdict: Verdict, progress: Prog
 def _stopped(bench: Bench) -> Verdict | None:
     """The verdict if the model is not fit to judge effects, otherwise None."""
     kept, bare = bench.study.kept, bench.bare
+    failed = not_converged({"the model": bench.base.convergence})
+    if failed is not None:
+        return with_failure_told(bench, failed)
     ended = {
-        "the model": bench.base.convergence,
         "the model to the healthy recording": bare.convergence if bare else None,
         "the kept parameters to the healthy recording": kept.convergence if kept else None,
     }

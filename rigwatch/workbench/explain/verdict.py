@@ -3,7 +3,7 @@
 `nothing_missing`, `missing_effect`, `undetermined` (rivals of different physics that this recording
 cannot distinguish), `unknown_effect` (the error stays above the noise floor, and no known effect
 explains it) or `model_inadequate` (the model's fit did not converge or does not describe the
-healthy rig, see `adequacy.py`; no effect is named). All five are valid results.
+healthy rig, see `adequacy/`; no effect is named). All five are valid results.
 
 Of effects with equal held-out errors, the one with the fewest parameters is named first; the others
 of its kind form its class.

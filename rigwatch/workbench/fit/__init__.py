@@ -46,7 +46,12 @@ from rigwatch.workbench.fit.intervals import (
     values,
 )
 from rigwatch.workbench.fit.profile import profile
-from rigwatch.workbench.fit.training import TrainingPart, continued_train_error, part_of
+from rigwatch.workbench.fit.training import (
+    TrainingPart,
+    continued_train_error,
+    each_recording,
+    part_of,
+)
 
 __all__ = [
     "NO_INFLUENCE",
@@ -60,6 +65,7 @@ __all__ = [
     "block_numbers",
     "continued_train_error",
     "covariance",
+    "each_recording",
     "eigenvalues",
     "error_text",
     "explains_more",

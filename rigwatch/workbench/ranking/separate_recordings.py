@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigwatch.physics.engine.fit import Recording
+from rigwatch.physics.engine.fit import apart
 from rigwatch.physics.engine.score import Candidate
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
@@ -52,7 +52,7 @@ def _one_by_one(
 ) -> tuple[FloatArray, FloatArray]:
     """`along` for each recording separately; each has initial states of its own."""
     system, parts = base.compiled.system, data.train.parts
-    pieces = zip(_pieces(data.train), _fits(base, len(parts)), strict=True)
+    pieces = zip(apart(data.train), _fits(base, len(parts)), strict=True)
     made = [along(replace(data, train=train), fitted, found) for train, fitted in pieces]
     free, states = len(system.free), len(system.states)
     moved = np.concatenate([piece for piece, _ in made], axis=1)
@@ -78,13 +78,6 @@ def check_ports(study: Study) -> None:
             f"{study.file.model}: found no port, expected one where effects may enter:"
             f" {EXPECTED_PORT}"
         )
-
-
-def _pieces(recording: Recording) -> list[Recording]:
-    ends = np.cumsum(recording.parts)[:-1]
-    inputs, outputs = np.split(recording.inputs, ends), np.split(recording.outputs, ends)
-    pieces = zip(recording.own_spacings, inputs, outputs, strict=True)
-    return [Recording(dt, u, y, parts=(len(u),)) for dt, u, y in pieces]
 
 
 def _fits(base: Fitted, parts: int) -> list[Fitted]:

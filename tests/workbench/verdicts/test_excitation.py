@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from rigwatch.workbench.compare.preparation import open_bench
-from rigwatch.workbench.explain.excitation import unexcited
+from rigwatch.workbench.explain.adequacy import unexcited
 from rigwatch.workbench.explain.explain import explain
 from rigwatch.workbench.study.creation import create
 from tests.workbench.machine import recorded, studied

@@ -19,6 +19,7 @@ from rigwatch.physics.engine.fit.recorded_effect_states import RecordedEffectSta
 from rigwatch.physics.engine.fit.recording import (
     SAME_SPACING,
     Recording,
+    apart,
     beginning,
     filled,
     initial_states,
@@ -58,6 +59,7 @@ __all__ = [
     "Started",
     "Tangent",
     "Thinning",
+    "apart",
     "beginning",
     "bounds",
     "covariance_of",

@@ -141,6 +141,18 @@ def joined(recordings: Sequence[Recording]) -> Recording:
     )
 
 
+def apart(recording: Recording) -> list[Recording]:
+    """Each of the concatenated recordings by itself; the residuals of none are thinned."""
+    return [
+        replace(
+            recording, dt=dt, inputs=recording.inputs[own], outputs=recording.outputs[own],
+            thinning=None, parts=(own.stop - own.start,), spacings=(),
+            breaks=tuple(at - own.start for at in recording.breaks if own.start <= at < own.stop),
+        )
+        for own, dt in zip(recording.slices, recording.own_spacings, strict=True)
+    ]  # fmt: skip
+
+
 def of_parts(spacings: Sequence[float], lengths: Sequence[int]) -> tuple[float, tuple[float, ...]]:
     """`dt` and `spacings` of a recording of parts.
 

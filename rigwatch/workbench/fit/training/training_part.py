@@ -3,6 +3,8 @@
 Most sets of effects that a search tries lead nowhere, and so do most delays of an input. Each is
 fitted to a part first: stretches of adjacent windows, spread evenly over all recordings. Only the
 best are fitted to the whole, which decides.
+
+Each recording by itself is a part as well: it shows whether the recordings agree.
 """
 
 import math
@@ -13,7 +15,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from rigwatch.physics.engine.equations import compose
-from rigwatch.physics.engine.fit import Fit, Recording, of_parts, windows
+from rigwatch.physics.engine.fit import Fit, Recording, apart, of_parts, windows
 from rigwatch.wire.arrays import IntArray
 from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit.fitted import Fitted
@@ -74,8 +76,7 @@ def part_of(study: Study, data: Data) -> TrainingPart | None:
 
 def _part(study: Study, data: Data) -> TrainingPart | None:
     whole = data.train
-    # Without states of its own a model has no windows, and some recordings must stay whole.
-    if not study.model.states or data.along_motion or whole.thinning or study.moving():
+    if not _is_divisible(study, data):
         return None
     cut = windows(compose(study.model), len(whole), data.horizon)
     starts, length = cut.starts, cut.length
@@ -93,6 +94,30 @@ def _part(study: Study, data: Data) -> TrainingPart | None:
         breaks=(), spacings=spacings,
     )  # fmt: skip
     return TrainingPart(replace(data, train=train), chosen)
+
+
+def each_recording(study: Study, data: Data) -> list[TrainingPart]:
+    """Each training recording as a part by itself; empty if they cannot be taken apart.
+
+    Args:
+        study, data: as in `part_of`.
+    """
+    if not _is_divisible(study, data):
+        return []
+    recordings = apart(data.train)
+    length = windows(compose(study.model), len(data.train), data.horizon).length
+    if any(len(alone) % length for alone in recordings):
+        return []
+    return [
+        TrainingPart(replace(data, train=alone), np.arange(own.start // length, own.stop // length))
+        for own, alone in zip(data.train.slices, recordings, strict=True)
+    ]
+
+
+def _is_divisible(study: Study, data: Data) -> bool:
+    """Whether windows can be taken out: a model without states has none, some must stay whole."""
+    whole = data.along_motion or data.train.thinning or study.moving()
+    return bool(study.model.states) and not whole
 
 
 def _counts(recording: Recording, length: int, every: int) -> list[int]:

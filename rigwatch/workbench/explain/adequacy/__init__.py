@@ -1,0 +1,38 @@
+"""Whether the model is fit to judge effects, and what to look at if it is not.
+
+adequate.py      the model on a healthy recording, other bases, outliers
+excitation.py    parameters that the training recordings do not excite
+failing_fit.py   where a model fails whose fit did not converge
+"""
+
+from rigwatch.workbench.explain.adequacy.adequate import (
+    SHORT,
+    inadequate,
+    stopped_by_outliers,
+    uncalibrated,
+    unchecked,
+    with_adequate_base,
+    with_base_offered,
+    with_change_told,
+)
+from rigwatch.workbench.explain.adequacy.excitation import (
+    cannot_tell,
+    unexcited,
+    with_unjudged_told,
+)
+from rigwatch.workbench.explain.adequacy.failing_fit import with_failure_told
+
+__all__ = [
+    "SHORT",
+    "cannot_tell",
+    "inadequate",
+    "stopped_by_outliers",
+    "uncalibrated",
+    "unchecked",
+    "unexcited",
+    "with_adequate_base",
+    "with_base_offered",
+    "with_change_told",
+    "with_failure_told",
+    "with_unjudged_told",
+]
