@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from monitor.drives import no_edges, no_instants
 from monitor.model import HealthyLimits
-from monitor.observer.input_lateness import no_lateness
+from monitor.observer.lateness import no_lateness
 from monitor.observer.missing_force import high_pass
 from rigwatch.wire.arrays import FloatArray
 
@@ -41,8 +41,9 @@ USUAL_LASTING, USUAL_SHORT, USUAL_MEDIUM, USUAL_FRICTION, USUAL_ONSET = range(5)
 """Rows of the healthy residual's extremes at the present motion, see `usual_error.Extremes`."""
 
 (
-    ERROR, DRY, WET, LEVEL, DISAGREE, MEASURED, DRIVEN, LATENESS, UNDECIDED, SPEED, BARE, LEVELS,
-) = range(12)  # fmt: skip
+    ERROR, DRY, WET, LEVEL, DISAGREE, MEASURED, DRIVEN, DELAYED, READ, UNDECIDED, SPEED,
+    BARE, LEVELS,
+) = range(13)  # fmt: skip
 """Columns of the history; from `LEVELS` on, the levels on which the healthy variance depends."""
 
 
@@ -79,7 +80,7 @@ class DecisionState(NamedTuple):
         value: verdict, named force, and energies of the drive recently and before.
         lasting: the last judged energies, relative to their limit, shape (LASTING,).
         sums: over a motion that was not recorded, shape (SUMS,).
-        lateness: of the inputs, see `input_lateness`.
+        lateness: of the inputs, see `lateness`.
         edges: of the inputs, see `monitor.drives.edge_choice`.
         instants: of edges that jitter, see `monitor.drives.read_instants`.
     """

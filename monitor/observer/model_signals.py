@@ -100,7 +100,7 @@ class Observed:
         measured: the measured output, shape (n,).
         predicted: the columns of the prediction.
         judged: high-passed columns, see `missing_force`, shape (n, JUDGED); the decision corrects
-            the residual for the inputs' edges.
+            the residual for the inputs' edges, and the response to later inputs for their side.
         steady: False where an input changes suddenly, stops, or steps between samples at a place
             that is not known yet, shape (n,).
         drive: pace of the first input, see `monitor.drives.Drive`, shape (n,).

@@ -30,6 +30,7 @@ from monitor.observer.decision_state import (
     ARMING,
     BARE,
     BEYOND,
+    DELAYED,
     DEPARTED,
     DEVIATION,
     DEVIATIONS,
@@ -42,7 +43,6 @@ from monitor.observer.decision_state import (
     FRICTION,
     HISTORY,
     JUDGING,
-    LATENESS,
     LEVEL,
     LEVELS,
     LONG,
@@ -51,6 +51,7 @@ from monitor.observer.decision_state import (
     MODE,
     NAMED_FORCE,
     OTHER,
+    READ,
     REST,
     SENSORS,
     SHARE,
@@ -71,22 +72,24 @@ from monitor.observer.decision_state import (
     DecisionRules,
     DecisionState,
 )
-from monitor.observer.input_lateness import (
+from monitor.observer.lagged_motion import EMPTY, FIRST, TAINTED
+from monitor.observer.lateness import (
     TAU,
-    UNSURE,
     compare_motion,
     follow_lateness,
     forget_lateness,
+    is_constant,
     is_late,
     lateness_changes,
+    response_to,
     rubs,
+    rubs_beside,
     seems_late,
     seems_to_grow,
     slides,
     told_lateness,
     unsure_lateness,
 )
-from monitor.observer.lagged_motion import EMPTY, FIRST, TAINTED
 from monitor.observer.missing_force import (
     DRY_BARE,
     JITTERS,
@@ -182,6 +185,7 @@ def decide(  # noqa: PLR0917 -- a kernel
             _restart(kept)
         _follow_drive(drive[k], steady[k], kept)
         kept.counts[GAP_AGO] = 0 if state[k] == TAINTED else kept.counts[GAP_AGO] + 1
+        judged[k, LATE_UNIT] = response_to(judged[k, LATE_UNIT], kept.lateness)
         if state[k] != TAINTED:
             _follow_inputs(kept, judged[k], usual[:, k], altered[k], rules)
             _remember(kept, judged[k], speed[k], levels[k])
@@ -238,25 +242,30 @@ def _follow_inputs(
     """
     count = kept.counts
     judging = count[WAS_JUDGING] == 1
-    calm = count[ONSET] < 0
+    calm, constant = count[ONSET] < 0, is_constant(kept.lateness)
     largest = min(rules.medium / rules.lasting, usual[USUAL_MEDIUM])
     healthy = _healthy_variance(kept, rules) if calm or not judging else 0.0
-    variance = healthy + mean_square(kept, LATENESS, MEDIUM)
+    variance = healthy + _late_variance(kept) + mean_square(kept, READ, MEDIUM)
     if calm and follow_edges(row[E], row[MOVED], row[UNSURE_INPUT], largest * variance, kept.edges):
         forget_lateness(kept.lateness)
         count[CHANGED] = 0
     row[E] = corrected(row[E], row[MOVED], kept.edges)
     if not judging or (calm and count[ABOVE] == 0):
         unsure, jitters = row[UNSURE_INPUT], row[JITTERS] > 0.0
-        follow_instants(row[E], unsure, jitters, healthy, judging, kept.instants)
+        late = kept.lateness[TAU] * row[LATE_UNIT] if constant else 0.0
+        follow_instants(row[E] - late, unsure, jitters, healthy, judging, kept.instants)
     count[KNOWN_AGO] = 0 if np.isinf(usual[USUAL_MEDIUM]) else count[KNOWN_AGO] + 1
     anew = 0 < count[KNOWN_AGO] <= LONG
     moves = is_late(kept.lateness) or slides(kept.lateness)
     learns = not judging or (calm and (count[ABOVE] == 0 or moves))
     if learns or (calm and anew):
         variance += edges_unsure(row[UNSURE_INPUT], kept.edges)
-        follow_lateness(row, largest * variance, judging, learns, anew, kept.lateness)
+        follow_lateness(row, largest * variance, healthy, judging, learns, anew, kept.lateness)
     compare_motion(altered, judging and calm, kept.lateness)
+    if is_constant(kept.lateness) != constant:
+        # What edges left, and what lasted, was judged beside another lateness.
+        fill(kept.instants, 0.0)
+        count[LASTED] = 0
     if not judging and lateness_changes(kept.lateness):
         count[CHANGED] = -LONG
     elif not judging and seems_to_grow(kept.lateness):
@@ -267,13 +276,12 @@ def _follow_inputs(
 def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatArray) -> None:
     """Store a sample; the first columns are in the order of the residual's."""
     head = kept.counts[HEAD]
-    for c in range(LATENESS):
+    for c in range(DELAYED):
         kept.rows[head, c] = row[c]
     late = kept.lateness[TAU] * row[LATE_UNIT]
     kept.rows[head, ERROR] = row[ERROR] - late
-    unsure = UNSURE * unsure_lateness(kept.lateness) * row[LATE_UNIT]
-    read = still_unsure(row[UNSURE_INPUT], kept.instants)
-    kept.rows[head, LATENESS] = np.hypot(unsure, read)
+    kept.rows[head, DELAYED] = row[LATE_UNIT]
+    kept.rows[head, READ] = still_unsure(row[UNSURE_INPUT], kept.instants)
     kept.rows[head, SPEED], kept.rows[head, BARE] = speed, row[DRY_BARE]
     kept.rows[head, UNDECIDED] = undecided(row[MOVED], kept.edges)
     for c in range(levels.size):
@@ -322,9 +330,9 @@ def _one(  # noqa: PLR0917 -- a kernel
     count[SINCE_START] += 1
     count[OUTSIDE] = 0 if not inside else min(count[OUTSIDE] + 1, LONG)
     out[AMPLITUDE, k] = mean_square(kept, LEVEL, MEDIUM)
-    late, open_edges = mean_square(kept, LATENESS, MEDIUM), mean_square(kept, UNDECIDED, MEDIUM)
-    exact = late + open_edges == 0.0
-    spread = np.sqrt(_healthy_variance(kept, rules) + late + open_edges)
+    late = _late_variance(kept)
+    edges = mean_square(kept, READ, MEDIUM) + mean_square(kept, UNDECIDED, MEDIUM)
+    spread = np.sqrt(_healthy_variance(kept, rules) + late + edges)
     out[SPREAD, k], out[FOUND_LATE, k] = spread, told_lateness(kept.lateness)
     force, viscous, deviations, _, _ = friction(kept, MEDIUM, spread)
     out[FORCE, k], out[VISCOUS, k], out[DEVIATIONS, k] = force, viscous, deviations
@@ -341,9 +349,10 @@ def _one(  # noqa: PLR0917 -- a kernel
     allowed = _friction_limit(usual[USUAL_FRICTION], rules)
     largest = max(np.sqrt(short), np.sqrt(medium), deviations / allowed)
     lasting = lasting_energy(kept, spread**2 * usual[USUAL_LASTING] * margin)
-    out[EVIDENCE, k] = onset_evidence(kept, spread)
+    constant = is_constant(kept.lateness)
+    out[EVIDENCE, k] = onset_evidence(kept, spread, unsure_lateness(kept.lateness), constant)
     onset = out[EVIDENCE, k] / (usual[USUAL_ONSET] * np.sqrt(margin))
-    if not exact or count[GAP_AGO] < LONG:
+    if (late > 0.0 and not constant) or edges > 0.0 or count[GAP_AGO] < LONG:
         onset = 0.0
     # A motion of another size than under the same drive before: slow evidence, never at once.
     size = min(response, SURE)
@@ -352,7 +361,7 @@ def _one(  # noqa: PLR0917 -- a kernel
     count[QUIET] = 0 if away else count[QUIET] + 1
     count[ABOVE] = count[ABOVE] + 1 if away else 0
     if count[ONSET] < 0:
-        known = 0.0 if np.isinf(usual[USUAL_SHORT]) or not exact else largest
+        known = 0.0 if np.isinf(usual[USUAL_SHORT]) or late + edges > 0.0 else largest
         away = count[ABOVE] >= REMAINS or _sure(out[DEVIATION, k], known, onset, kept)
     away = away or count[JUMP_AGO] == 0
     mode = _mode(kept, rules)
@@ -413,9 +422,17 @@ def _sure(deviation: float, known: float, onset: float, kept: DecisionState) -> 
         kept: the state.
     """
     if is_late(kept.lateness):
-        return kept.counts[ABOVE] >= MEDIUM and rubs(kept.lateness)
+        beside = is_constant(kept.lateness)
+        rubbing = rubs_beside(kept.lateness) if beside else rubs(kept.lateness)
+        return onset > 1.0 or (kept.counts[ABOVE] >= MEDIUM and rubbing)
     new = known > SURELY_NEW or onset > 1.0
     return deviation > SURE or (new and not seems_late(kept.lateness))
+
+
+@part()
+def _late_variance(kept: DecisionState) -> float:
+    """Mean square of what is not known of the inputs' lateness."""
+    return unsure_lateness(kept.lateness) ** 2 * mean_square(kept, DELAYED, MEDIUM)
 
 
 @part()

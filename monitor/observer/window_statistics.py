@@ -7,6 +7,7 @@ import numpy as np
 
 from monitor.observer.decision_state import (
     BARE,
+    DELAYED,
     DRIVEN,
     DRY,
     ERROR,
@@ -135,7 +136,7 @@ def friction(
 
 
 @part()
-def onset_evidence(kept: DecisionState, spread: float) -> float:
+def onset_evidence(kept: DecisionState, spread: float, unsure: float, jumps: bool) -> float:
     """Evidence of dry friction that has just begun, in standard deviations; 0 if it would push.
 
     Of the windows that end now, the largest of the likelihood ratio's root for a force of dry
@@ -147,15 +148,24 @@ def onset_evidence(kept: DecisionState, spread: float) -> float:
     Args:
         kept: the state.
         spread: of the healthy residual at this motion.
+        unsure: lateness of the inputs that is not known [samples]: what it may leave is none.
+        jumps: whether inputs that are late may jump to another lateness, as a clock slips. One that
+            leaves as little is none either.
     """
-    most = a = p = 0.0
+    most = latest = a = p = late = late_error = late_bare = 0.0
     for ago in range(1, min(MEDIUM, kept.counts[FILLED]) + 1):
         row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
         a += row[BARE] * row[BARE]
         p += row[BARE] * row[ERROR]
-        if ago >= SHORTEST and p > 0.0 and a > 0.0:
-            most = max(most, p * p / a)
-    return np.sqrt(most) / spread
+        late += row[DELAYED] * row[DELAYED]
+        late_error += row[DELAYED] * row[ERROR]
+        late_bare += row[DELAYED] * row[BARE]
+        surely = p - unsure * abs(late_bare)
+        if ago >= SHORTEST and surely > 0.0 and a > 0.0:
+            most = max(most, surely * surely / a)
+        if ago >= SHORTEST and late > 0.0:
+            latest = max(latest, late_error * late_error / late)
+    return 0.0 if jumps and latest > most else np.sqrt(most) / spread
 
 
 @part()

@@ -8,6 +8,7 @@ from monitor.observer import window_statistics
 from monitor.observer.decision_state import (
     AT,
     BARE,
+    DELAYED,
     DRY,
     ERROR,
     HISTORY,
@@ -24,6 +25,7 @@ from tests.compiled import from_python
 
 dry_force = from_python(window_statistics.dry_force)
 friction = from_python(window_statistics.friction)
+onset_evidence = from_python(window_statistics.onset_evidence)
 
 FORCE, LENGTH = 0.6, 64
 
@@ -102,3 +104,31 @@ def test_a_motion_that_turns_at_every_sample_shows_no_friction() -> None:
     kept.counts[AT.filled] = HISTORY
 
     assert friction(kept, LENGTH, 1e-3) == (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def begun(column: int) -> DecisionState:
+    """A residual that has been for 12 samples the response in a column.
+
+    Friction and later inputs have responses that are alike.
+    """
+    kept = swinging()
+    kept.rows[:, DELAYED] = -kept.rows[:, SPEED]
+    kept.rows[-12:, ERROR] = 0.5 * kept.rows[-12:, column]
+    return kept
+
+
+@pytest.mark.parametrize(
+    ("column", "jumps", "shows"),
+    [(BARE, False, True), (BARE, True, True), (DELAYED, False, True), (DELAYED, True, False)],
+)
+def test_an_onset_of_friction_is_told_from_a_jump_of_the_lateness(
+    column: int, jumps: bool, shows: bool
+) -> None:
+    assert (onset_evidence(begun(column), 0.05, 0.0, jumps) > 6.7) == shows
+
+
+def test_what_an_unknown_lateness_may_leave_is_no_onset() -> None:
+    kept = begun(DELAYED)
+
+    assert onset_evidence(kept, 0.05, 0.5, False) == 0.0
+    assert onset_evidence(kept, 0.05, 0.2, False) > 6.7

@@ -36,13 +36,23 @@ def sweep(t: np.ndarray) -> np.ndarray:
 
 
 def held(
-    wave: Wave, updates_hz: float, seconds: float, *, between: bool, events=(), seed: int = 11
+    wave: Wave,
+    updates_hz: float,
+    seconds: float,
+    *,
+    between: bool,
+    late: float = 0.0,
+    events=(),
+    seed: int = 11,
 ) -> dict[str, np.ndarray]:
-    """A run with a voltage that is updated at samples, or between them; read at samples."""
+    """A run with a voltage that is updated at samples, or between them; read at samples.
+
+    It acts late by a part of a sample.
+    """
     n = round(seconds * RATE)
     t = np.arange(n * FINE) / (RATE * FINE)
     fine = wave(np.floor(t * updates_hz + 1e-9) / updates_hz)
-    read = fine[::FINE]
+    read, fine = fine[::FINE], np.roll(fine, round(late * FINE))
     acts = fine.reshape(n, FINE).mean(axis=1) if between else read
     channels = run(_recorded(acts), seconds, events, seed)
     channels["voltage"] = run(_recorded(read), seconds, seed=seed)["voltage"]
@@ -75,6 +85,16 @@ def test_friction_is_noticed_while_the_steps_slide(wave: Wave, off: float) -> No
 
     assert min(times[name] for name in FAULTS & times.keys()) >= 10.0
     assert "dry_friction" in times
+
+
+@pytest.mark.parametrize("late", [0.35, 0.9])
+def test_friction_beside_a_constant_lateness_is_noticed_as_soon(late: float) -> None:
+    voltage = held(sine, RATE, 9.0, between=True, late=late, events=coulomb(7.0))
+    times = raised(watched(voltage))
+
+    assert min(times[name] for name in FAULTS & times.keys()) >= 7.0
+    assert times["departure"] < 7.1
+    assert times["dry_friction"] < 7.2
 
 
 def test_commissioning_takes_held_readings_as_they_are() -> None:

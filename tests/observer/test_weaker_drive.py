@@ -5,8 +5,8 @@ import pytest
 
 from monitor.observer import Extremes, decide, new_state
 from monitor.observer import decision_state as d
-from monitor.observer.input_lateness import AGO
 from monitor.observer.lagged_motion import WHOLE
+from monitor.observer.lateness.lateness_state import AGO
 from monitor.observer.missing_force import DRY_BARE, DRY_UNIT, JUDGED, VISCOUS_UNIT, WEAK, E
 
 SECONDS, RATE, ONSET, FORCE = 4.0, 256.0, 640, 3.0

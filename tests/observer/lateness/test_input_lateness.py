@@ -3,37 +3,19 @@
 import numpy as np
 import pytest
 
-from monitor.observer import input_lateness
-from monitor.observer.input_lateness import SLOW, TAU, no_lateness
+from monitor.observer.lateness import TAU, input_lateness, lateness_state, no_lateness
+from monitor.observer.lateness.lateness_state import SLOW
 from monitor.observer.missing_force import COLUMNS, DRY_UNIT, LATE_UNIT, E
 from tests.compiled import from_python
+from tests.observer.lateness.followed import AT, DRY, LATE, NOISE, N, follow_lateness, learnt
 
-follow_lateness = from_python(input_lateness.follow_lateness)
-is_late = from_python(input_lateness.is_late)
+is_late = from_python(lateness_state.is_late)
 lateness_changes = from_python(input_lateness.lateness_changes)
 rubs = from_python(input_lateness.rubs)
 seems_late = from_python(input_lateness.seems_late)
 seems_to_grow = from_python(input_lateness.seems_to_grow)
 slides = from_python(input_lateness.slides)
 told_lateness = from_python(input_lateness.told_lateness)
-unsure_lateness = from_python(input_lateness.unsure_lateness)
-
-N, NOISE = 1024, 0.1
-AT = 2.0 * np.pi * np.arange(N) / 32.0
-LATE, DRY = 2.0 * np.sin(AT), -4.0 * np.sign(np.sin(AT + 0.4))
-
-
-def learnt(
-    error: np.ndarray, *, dry: np.ndarray = DRY, kept: np.ndarray | None = None
-) -> np.ndarray:
-    """The carried figures after a residual, where `dry` is the response to dry friction."""
-    rows = np.zeros((N, len(COLUMNS)))
-    rows[:, E] = error + NOISE * np.random.default_rng(8).standard_normal(N)
-    rows[:, LATE_UNIT], rows[:, DRY_UNIT] = LATE, dry
-    kept = no_lateness() if kept is None else kept
-    for row in rows:
-        follow_lateness(row, NOISE**2, False, True, False, kept)
-    return kept
 
 
 @pytest.mark.parametrize("tau", [-0.9, -0.4, 0.3, 1.0])
@@ -63,7 +45,7 @@ def test_a_lateness_that_grows_slowly_is_told_from_a_sudden_one(since, grows) ->
     rows[:, LATE_UNIT], rows[:, DRY_UNIT] = LATE, DRY
     kept = no_lateness()
     for row in rows:
-        follow_lateness(row, NOISE**2, True, True, False, kept)
+        follow_lateness(row, NOISE**2, NOISE**2, True, True, False, kept)
 
     assert slides(kept) == grows
     assert (kept[TAU] > 0.4) == grows
@@ -88,11 +70,6 @@ def test_a_lateness_that_friction_explains_as_well_seems_to_grow() -> None:
     assert not seems_to_grow(learnt(np.linspace(0.0, 3.0, N) * dry, dry=dry))
 
 
-def test_inputs_that_slide_are_unsure_where_an_edge_meets_a_sample() -> None:
-    assert unsure_lateness(learnt(np.linspace(0.6, 0.0, N) * LATE)) == 0.5
-    assert unsure_lateness(learnt(np.zeros(N))) == 0.0
-
-
 def test_friction_is_not_learnt_as_lateness() -> None:
     kept = learnt(0.3 * DRY)
 
@@ -115,7 +92,9 @@ def test_a_residual_as_large_as_in_commissioning_is_not_explained() -> None:
     rows[:, E], rows[:, LATE_UNIT], rows[:, DRY_UNIT] = 0.5 * LATE, LATE, DRY
     kept = no_lateness()
     for row in rows:
-        follow_lateness(row, 4.0 * float(np.mean(rows[:, E] ** 2)), False, True, False, kept)
+        follow_lateness(
+            row, 4.0 * float(np.mean(rows[:, E] ** 2)), NOISE**2, False, True, False, kept
+        )
 
     assert kept[TAU] == 0.0
     assert not is_late(kept)
@@ -132,7 +111,7 @@ def test_what_a_healthy_rig_usually_leaves_is_left_if_the_motion_has_just_become
     rows[:, E], rows[:, LATE_UNIT] = healthy - 0.6 * LATE, LATE
     rows[:, DRY_UNIT] = np.sign(np.cos(AT))
     for row in rows:
-        follow_lateness(row, largest, True, True, anew, kept)
+        follow_lateness(row, largest, largest, True, True, anew, kept)
 
     assert kept[TAU] == pytest.approx(expected, abs=0.1)
 
@@ -141,11 +120,11 @@ def test_what_was_seen_before_a_deviation_is_learnt_once_the_motion_is_known() -
     kept, row = no_lateness(), np.zeros(len(COLUMNS))
     for late, dry in zip(LATE, DRY, strict=True):
         row[E], row[LATE_UNIT], row[DRY_UNIT] = -0.5 * late, late, dry
-        follow_lateness(row, 1.0, True, True, False, kept)
+        follow_lateness(row, 1.0, 1.0, True, True, False, kept)
     assert kept[TAU] == 0.0
 
     row[E] = 10.0
-    follow_lateness(row, NOISE**2, True, False, True, kept)
+    follow_lateness(row, NOISE**2, NOISE**2, True, False, True, kept)
 
     assert kept[TAU] == pytest.approx(-0.5, abs=0.01)
 
@@ -163,7 +142,7 @@ def test_more_than_inputs_can_be_late_is_none() -> None:
     row = np.zeros(len(COLUMNS))
     for late in LATE[: round(SLOW / 4)]:
         row[E], row[LATE_UNIT] = 3.0 * late, late
-        follow_lateness(row, NOISE**2, False, True, False, kept)
+        follow_lateness(row, NOISE**2, NOISE**2, False, True, False, kept)
 
     assert not lateness_changes(kept)
 
@@ -173,7 +152,7 @@ def test_a_lateness_that_jumps_is_said_to_change() -> None:
     row, changes = np.zeros(len(COLUMNS)), []
     for late, dry in zip(LATE[: round(SLOW)], DRY, strict=False):
         row[E], row[LATE_UNIT], row[DRY_UNIT] = 0.4 * late, late, dry
-        follow_lateness(row, NOISE**2, False, True, False, kept)
+        follow_lateness(row, NOISE**2, NOISE**2, False, True, False, kept)
         changes.append(lateness_changes(kept))
 
     assert sum(changes) > SLOW / 2
@@ -183,7 +162,7 @@ def test_friction_is_no_lateness_that_changes() -> None:
     kept, row, changes = learnt(-0.5 * LATE), np.zeros(len(COLUMNS)), []
     for late, dry in zip(LATE, DRY, strict=True):
         row[E], row[LATE_UNIT], row[DRY_UNIT] = 0.5 * dry, late, dry
-        follow_lateness(row, NOISE**2, False, True, False, kept)
+        follow_lateness(row, NOISE**2, NOISE**2, False, True, False, kept)
         changes.append(lateness_changes(kept))
 
     assert not any(changes[round(SLOW) :])

@@ -5,11 +5,12 @@ its voltage acts half a sample earlier than one that does. To first order the re
 with s the response to inputs late by one sample and τ unknown. τ is taken from the residual where
 it explains nearly all of it and leaves at most half of what dry friction would. It is learnt while
 the rig is not judged and followed slowly afterwards, so that a fault, which is sudden, is not
-learnt. Only a motion that is steady is known to have been recorded; then the healthy residual is
-known to be smaller than it was taken to be, and what was seen before decides anew, also where it
-now deviates. More mass, a spring or a lower supply may leave the same residual at one frequency.
-They change size or shape of the motion, which later inputs only shift: under a drive that was
-recorded, a lateness is believed if the motion is the recorded one.
+learnt; what has become constant is kept (`constant_lateness`). Only a motion that is steady is
+known to have been recorded; then the healthy residual is known to be smaller than it was taken to
+be, and what was seen before decides anew, also where it now deviates. More mass, a spring or a
+lower supply may leave the same residual at one frequency. They change size or shape of the motion,
+which later inputs only shift: under a drive that was recorded, a lateness is believed if the motion
+is the recorded one.
 """
 
 # Compiled functions are untyped to mypy.
@@ -17,17 +18,35 @@ recorded, a lateness is believed if the motion is the recorded one.
 
 import numpy as np
 
-from monitor.observer.missing_force import DRY_UNIT, LATE_UNIT, E
-from monitor.signals import fill
+from monitor.observer.lateness.constant_lateness import (
+    is_another,
+    is_constant,
+    keep_constant,
+    wait_until_constant,
+)
+from monitor.observer.lateness.lateness_state import (
+    AGO,
+    COMPARED,
+    DENIED,
+    EARLIEST,
+    ERRORS,
+    FOR,
+    LATEST,
+    OF_QUICK,
+    OF_SLOW,
+    RATHER,
+    RECENT,
+    SAME,
+    TAU,
+    best,
+    is_late,
+    learn,
+    left,
+    rubbing,
+)
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import part
 
-LATEST, EARLIEST = 1.15, -1.25
-"""Largest lateness either way [samples]: that of a held voltage, the relative error of the response
-(`UNSURE`), and what the response, which is that to later inputs, lacks for earlier ones.
-"""
-QUICK, SLOW = 32.0, 128.0
-"""Memory of what it is learnt from, before and while the rig is judged [samples]."""
 EXPLAINS, REST = 0.85, 0.25
 """Share of the residual's energy that it must explain, besides a share of the largest healthy one;
 less than that one is not explained at all.
@@ -38,14 +57,6 @@ share that must be explained in any case. Later, so little would be a small faul
 """
 SOME_OF_IT = 0.2
 """Share that a lateness explains even while it jumps to another one."""
-RATHER = 2.0
-"""Ratio of what dry friction leaves to what it leaves above which it is a lateness: where both
-explain the residual, friction is an alarm and a lateness hides one.
-"""
-UNSURE = 0.15
-"""Relative error of the response: equations fitted to one lateness are less accurate at another."""
-HALF = 0.5
-"""Mean lateness of inputs that slide past the samples."""
 UNSTEADY = 0.2
 """Lateness, and change of it, that matters [samples]."""
 GROWS = 0.6
@@ -54,68 +65,56 @@ long before: a sudden one reaches it only after the slow memory, a clock's slide
 """
 GROWTH = 0.05
 """Difference between the two memories' lateness, about that of half a sample in four seconds."""
-SHOWN, RECENT = 128.0, 4096.0
-"""Samples for which a lateness must be found to count, as at a start there may be a false one; and
-those after which one no longer found is forgotten: the longest interval between skips.
-"""
+SHOWN = 128.0
+"""Samples for which a lateness must be found to count, as at a start there may be a false one."""
 HALF_SETTLED, SETTLED = 384.0, 768.0
 """Samples of a motion under a recorded drive after which the means of its size and shape contain
 so little of the start that twice the limit tells another motion, and nothing of it any more.
 """
-ERRORS, PRODUCTS, RESPONSES, RUBBED, FRICTIONS = range(5)
-"""Means of e², e·s, s², e·g and g², with g the response to dry friction."""
-OF_QUICK, OF_SLOW, TAU, FOR, AGO, COMPARED, DENIED = 0, 5, 10, 11, 12, 13, 14
-"""Carried figures: the means with both memories, τ, the time for which it has mattered, the time
-since it did, `RECENT` if never, that for which the motion could be compared, and whether it is
-another one.
-"""
-
-
-def no_lateness() -> FloatArray:
-    """The figures at the start."""
-    kept = np.zeros(DENIED + 1)
-    kept[AGO] = RECENT
-    return kept
-
-
-@part()
-def forget_lateness(kept: FloatArray) -> None:
-    """Begin anew."""
-    fill(kept, 0.0)
-    kept[AGO] = RECENT
 
 
 @part()
 def follow_lateness(  # noqa: PLR0917 -- a kernel
-    row: FloatArray, largest: float, judging: bool, learns: bool, anew: bool, kept: FloatArray
+    row: FloatArray,
+    largest: float,
+    healthy: float,
+    judging: bool,
+    learns: bool,
+    anew: bool,
+    kept: FloatArray,
 ) -> None:
     """Follow the lateness to a sample.
 
     Args:
         row: its judged columns, see `missing_force`.
         largest: mean square of the healthy residual at the present motion.
+        healthy: its variance.
         judging: whether the rig is judged.
         learns: whether the sample counts, or only those before it, as where it deviates.
         anew: whether the motion has just become known.
         kept: the carried figures.
     """
     if learns:
-        _learn(row, kept)
+        learn(row, kept)
     if kept[DENIED] > 0.0:
         return
+    if is_constant(kept) and judging and not is_another(kept):
+        keep_constant(row, healthy, kept)
+        return
     first = OF_SLOW if judging and not is_late(kept) and not slides(kept) else OF_QUICK
-    energy, found = kept[first + ERRORS], _best(kept, first)
+    energy, found = kept[first + ERRORS], best(kept, first)
     least = (1.0 - EXPLAINS) * energy + REST * largest
     if anew:
         usually = (1.0 - EXPLAINS) * energy + USUAL * largest
         least = max(least, min(usually, (1.0 - MOST_OF_IT) * energy))
-    least = min(least, _rubbing(kept, first) / RATHER)
-    if energy > largest and _left(found, kept, first) < least and EARLIEST < found < LATEST:
+    least = min(least, rubbing(0.0, kept, first) / RATHER)
+    if energy > largest and left(found, kept, first) < least and EARLIEST < found < LATEST:
         kept[TAU] = found
     else:
         kept[TAU] = _towards_none(kept[TAU], found)
     kept[FOR] = kept[FOR] + 1.0 if abs(kept[TAU]) > UNSTEADY else 0.0
     kept[AGO] = 0.0 if kept[FOR] >= SHOWN else min(kept[AGO] + 1.0, RECENT)
+    wait_until_constant(judging, kept)
 
 
 @part()
@@ -139,8 +138,8 @@ def compare_motion(altered: float, calm: bool, kept: FloatArray) -> None:
     if not calm or kept[COMPARED] < HALF_SETTLED or abs(kept[TAU]) <= UNSTEADY:
         return
     limit = 1.0 + (SETTLED - kept[COMPARED]) / (SETTLED - HALF_SETTLED)
-    if altered > limit or _best(kept, OF_SLOW) in (EARLIEST, LATEST):
-        kept[DENIED], kept[TAU], kept[FOR], kept[AGO] = 1.0, 0.0, 0.0, RECENT
+    if altered > limit or best(kept, OF_SLOW) in (EARLIEST, LATEST):
+        kept[DENIED], kept[TAU], kept[FOR], kept[AGO], kept[SAME] = 1.0, 0.0, 0.0, RECENT, 0.0
 
 
 @part()
@@ -150,42 +149,14 @@ def _towards_none(known: float, found: float) -> float:
 
 
 @part()
-def _learn(row: FloatArray, kept: FloatArray) -> None:
-    for first, memory in ((OF_QUICK, QUICK), (OF_SLOW, SLOW)):
-        _average(row[E] * row[E], first + ERRORS, memory, kept)
-        _average(row[E] * row[LATE_UNIT], first + PRODUCTS, memory, kept)
-        _average(row[LATE_UNIT] * row[LATE_UNIT], first + RESPONSES, memory, kept)
-        _average(row[E] * row[DRY_UNIT], first + RUBBED, memory, kept)
-        _average(row[DRY_UNIT] * row[DRY_UNIT], first + FRICTIONS, memory, kept)
-
-
-@part()
-def _average(value: float, place: int, memory: float, kept: FloatArray) -> None:
-    kept[place] += (value - kept[place]) / memory
-
-
-@part()
-def is_late(kept: FloatArray) -> bool:
-    """Whether there is or was a lateness, which may change."""
-    return kept[AGO] < RECENT
-
-
-@part()
 def told_lateness(kept: FloatArray) -> float:
     """The lateness for people [samples]: one that has mattered for a while and stays; else 0."""
     if kept[AGO] > 0.0:
         return 0.0
-    stays = abs(_best(kept, OF_QUICK) - _best(kept, OF_SLOW)) <= GROWTH
+    if is_constant(kept):
+        return kept[TAU]
+    stays = abs(best(kept, OF_QUICK) - best(kept, OF_SLOW)) <= GROWTH
     return kept[TAU] if stays else 0.0
-
-
-@part()
-def unsure_lateness(kept: FloatArray) -> float:
-    """The lateness whose response is not accurate [samples]; of inputs that slide, half a sample.
-
-    Where an edge is close to a sample, some inputs act before it and some after it.
-    """
-    return max(abs(kept[TAU]), HALF) if is_late(kept) else abs(kept[TAU])
 
 
 @part()
@@ -194,11 +165,11 @@ def slides(kept: FloatArray) -> bool:
 
     It explains nearly all of the newest samples, more than dry friction does.
     """
-    found, before = _best(kept, OF_QUICK), _best(kept, OF_SLOW)
+    found, before = best(kept, OF_QUICK), best(kept, OF_SLOW)
     grown = abs(found) > UNSTEADY and before * np.sign(found) > GROWS * abs(found)
-    left = _left(found, kept, OF_QUICK)
-    explains = left < (1.0 - EXPLAINS) * kept[OF_QUICK + ERRORS]
-    return grown and explains and RATHER * left < _rubbing(kept, OF_QUICK)
+    leaves = left(found, kept, OF_QUICK)
+    explains = leaves < (1.0 - EXPLAINS) * kept[OF_QUICK + ERRORS]
+    return grown and explains and RATHER * leaves < rubbing(0.0, kept, OF_QUICK)
 
 
 @part()
@@ -207,10 +178,10 @@ def seems_to_grow(kept: FloatArray) -> bool:
 
     Either explains most of them, and friction hardly more: of a triangle the two are nearly alike.
     """
-    found, before = _best(kept, OF_QUICK), _best(kept, OF_SLOW)
+    found, before = best(kept, OF_QUICK), best(kept, OF_SLOW)
     more = abs(found) > UNSTEADY and before * np.sign(found) > 0.0
     more = more and abs(found) - abs(before) > GROWTH
-    late, rubbed = _left(found, kept, OF_QUICK), _rubbing(kept, OF_QUICK)
+    late, rubbed = left(found, kept, OF_QUICK), rubbing(0.0, kept, OF_QUICK)
     most = max(late, rubbed) < MOST_OF_IT * kept[OF_QUICK + ERRORS]
     return more and most and late < RATHER * rubbed
 
@@ -218,15 +189,15 @@ def seems_to_grow(kept: FloatArray) -> bool:
 @part()
 def seems_late(kept: FloatArray) -> bool:
     """Whether a lateness, and not dry friction, explains the newest samples: a clock may slip."""
-    left = _left(_best(kept, OF_QUICK), kept, OF_QUICK)
-    most = left < MOST_OF_IT * kept[OF_QUICK + ERRORS]
-    return most and RATHER * left < _rubbing(kept, OF_QUICK)
+    leaves = left(best(kept, OF_QUICK), kept, OF_QUICK)
+    most = leaves < MOST_OF_IT * kept[OF_QUICK + ERRORS]
+    return most and RATHER * leaves < rubbing(0.0, kept, OF_QUICK)
 
 
 @part()
 def rubs(kept: FloatArray) -> bool:
     """Whether dry friction explains the newest samples better than any lateness does."""
-    return _rubbing(kept, OF_QUICK) < _left(_best(kept, OF_QUICK), kept, OF_QUICK)
+    return rubbing(0.0, kept, OF_QUICK) < left(best(kept, OF_QUICK), kept, OF_QUICK)
 
 
 @part()
@@ -236,29 +207,8 @@ def lateness_changes(kept: FloatArray) -> bool:
     One that explains hardly anything, or less than dry friction, or is more than inputs can be late
     is none: something else has changed.
     """
-    found, before = _best(kept, OF_QUICK), _best(kept, OF_SLOW)
+    found, before = best(kept, OF_QUICK), best(kept, OF_SLOW)
     if not is_late(kept) or found in (EARLIEST, LATEST) or abs(found - before) <= UNSTEADY:
         return False
-    some = _left(found, kept, OF_QUICK) < (1.0 - SOME_OF_IT) * kept[OF_QUICK + ERRORS]
+    some = left(found, kept, OF_QUICK) < (1.0 - SOME_OF_IT) * kept[OF_QUICK + ERRORS]
     return some and not rubs(kept)
-
-
-@part()
-def _best(kept: FloatArray, first: int) -> float:
-    """The lateness that explains most."""
-    found = kept[first + PRODUCTS] / max(kept[first + RESPONSES], 1e-300)
-    return min(max(found, EARLIEST), LATEST)
-
-
-@part()
-def _left(tau: float, kept: FloatArray, first: int) -> float:
-    """Mean square of the residual without a lateness."""
-    explained = tau * (2.0 * kept[first + PRODUCTS] - tau * kept[first + RESPONSES])
-    return kept[first + ERRORS] - explained
-
-
-@part()
-def _rubbing(kept: FloatArray, first: int) -> float:
-    """Mean square of the residual without dry friction."""
-    explained = max(kept[first + RUBBED], 0.0) ** 2 / max(kept[first + FRICTIONS], 1e-300)
-    return kept[first + ERRORS] - explained
