@@ -10,7 +10,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, starmap
 from pathlib import Path
 
 import numpy as np
@@ -171,7 +171,7 @@ def _needed(block: EstimateBlock) -> EstimateBlock:
 def _joined(judged: Sequence[Judged]) -> list[Judged]:
     """The blocks as one, or as they are if something is missing between them."""
     estimates, samples = [one for one, _ in judged], [one for _, one in judged]
-    if all(continues(*pair) for blocks in (estimates, samples) for pair in pairwise(blocks)):
+    if all(starmap(continues, (*pairwise(estimates), *pairwise(samples)))):
         return [(concatenate(estimates), concatenate(samples))]
     return list(judged)
 
