@@ -58,7 +58,6 @@ class Explainer:
         self._model, self._files = model, tuple(effect_files)
         self._judged: deque[Judged] = deque()
         self._loose: list[Judged] = []
-        self._boot: int | None = None
         self._wanted: Alarm | None = None
         self._friction: tuple[int, int] | None = None
         self._told: dict[tuple[int, int], str] = {}
@@ -84,8 +83,8 @@ class Explainer:
 
     def _keep(self, block: EstimateBlock, samples: SampleBlock, rate: float) -> None:
         """Buffer a block, drop what is too old, and all of an earlier boot."""
-        if block.boot != self._boot:
-            self._boot = block.boot
+        newest = self._loose or self._judged
+        if newest and newest[-1][0].boot != block.boot:
             self._judged.clear()
             self._loose.clear()
         self._loose.append((block, samples))
