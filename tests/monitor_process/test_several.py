@@ -11,7 +11,7 @@ from monitor.process.several import Seat, one_turn, run_several
 from rigwatch.commands import main
 from rigwatch.wire.bus import Bus
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
-from rigwatch.wire.delivery import SampleRing
+from rigwatch.wire.delivery import Item, SampleRing
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.messages import ESTIMATES, SAMPLES, EstimateBlock, concatenate
 from rigwatch.wire.rig_config import RigConfig, load_rig
@@ -116,7 +116,7 @@ def test_each_rig_is_judged_as_if_alone_and_one_without_a_router_delays_none(ben
 
 
 class Unreadable:
-    """A reader whose queue cannot be looked at."""
+    """A reader whose queue can be neither looked at nor, where a look is due, read."""
 
     def __init__(self, reader: object) -> None:
         self._reader = reader
@@ -125,6 +125,9 @@ class Unreadable:
         return getattr(self._reader, name)
 
     def may_hold(self) -> bool:
+        raise OSError("the disk is gone")
+
+    def read(self, _wait_s: float) -> list[Item]:
         raise OSError("the disk is gone")
 
 
