@@ -12,9 +12,10 @@ from rigwatch.demo.commissioning import ensure_model
 from rigwatch.demo.own_folder import own_folder
 from rigwatch.demo.rig_file import forget_alarms, write_rig_file
 from rigwatch.demo.show import Show
-from rigwatch.demo.workbench_pages import workbench_pages
+from rigwatch.demo.workbench_pages import Pages, workbench_pages
 
 __all__ = [
+    "Pages",
     "Show",
     "ensure_model",
     "forget_alarms",

@@ -5,9 +5,10 @@ the monitor finds to be missing in its model.
 """
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from math import inf, isinf
+from textwrap import wrap
 
 from rigwatch.demo.verdict import ALARM
 from rigwatch.wire.messages import PROBABLY_MISSING, Alarm, EstimateBlock, Event
@@ -34,6 +35,8 @@ SIZE = "theta1"
 SIZED_AFTER = 2.0
 """Time from the naming of dry friction to the estimate of its size that is told [s]."""
 _STATEMENTS = re.compile(r"(\w+@\w+) (\(.*?\)): (explains [^;]*)(?:;(.*))?", re.DOTALL)
+WIDTH = 88
+"""Longest line of a statement, without its margin [characters]."""
 ENDED = ("normal", "cleared_unacknowledged")
 NAMELESS = "departure"
 """The alarm that reports a fault without naming it."""
@@ -98,6 +101,7 @@ class Narrator:
         studies: folder of the studies that the workbench makes of alarms.
         known: the dry friction that the monitor was commissioned with [N].
         attended: people watch, so commands that a running rig answers are told.
+        workbench: gives the address of the workbench, empty without one.
 
     Attributes:
         alarms: raised so far.
@@ -113,17 +117,20 @@ class Narrator:
         *,
         known: float,
         attended: bool = True,
+        workbench: Callable[[], str] = str,
     ) -> None:
         self.alarms: list[Alarm] = []
         self.explained = False
         self._attended, self._known = attended, known
         self._size, self._sized_at = 0.0, inf
         self._say, self._config, self._studies = say, rig, studies
+        self._workbench = workbench
         self._rate, self._cycle_s = scenario.plant.sample_rate, scenario.cycle_s
         self._acts = acts(scenario)
         self._next = next(self._acts, None)
         self._last: Act | None = None
         self._ended: Alarm | None = None
+        self._unnamed: Alarm | None = None
         self._told, self._untold = set[str](), 0
 
     def samples(self, seq: int) -> None:
@@ -213,10 +220,18 @@ class Narrator:
             self._untold += 1
             return
         self._say(f"{self._time(alarm.seq)} ALARM: {alarm.cause}{self._delay(alarm)}")
+        if not of_the_chain:
+            self._tell_whose_name(alarm)
         for line in OF_THE_CHAIN if of_the_chain else ():
             self._say(f"            {line}")
         self._advise(alarm)
         self._told.add(alarm.name)
+
+    def _tell_whose_name(self, alarm: Alarm) -> None:
+        """Say that an alarm names the fault of an earlier one."""
+        if alarm.name != NAMELESS and self._unnamed is not None:
+            self._say(f"            (this names the fault behind {self._called(self._unnamed)})")
+        self._unnamed = alarm if alarm.name == NAMELESS else None
 
     def _advise(self, alarm: Alarm) -> None:
         """Say once for each name what to do, and once where all alarms are listed."""
@@ -239,8 +254,10 @@ class Narrator:
             whose = self._whose(event)
             self._say(f"            {whose}probably missing in the rig's model: {first}")
             for line in more:
-                self._say(f"              {line}")
-            newest = next((a.name for a in self.alarms[::-1] if a.name in OF_THE_RIG), "")
+                for part in wrap(line, WIDTH):
+                    self._say(f"              {part}")
+            alarm = self._newest(OF_THE_RIG)
+            newest = alarm.name if alarm else ""
             # An explanation bears the name of the first alarm, which is mostly a departure.
             if newest == ALARM or event.text.startswith(ALARM):
                 force, times = f"{self._size * self._known:.2f} N", f"{self._size:.2f} times"
@@ -254,9 +271,15 @@ class Narrator:
 
     def _whose(self, event: Event) -> str:
         """Which alarm an explanation belongs to: others may have come since."""
-        name = event.text.partition(": ")[0]
-        alarm = next((one for one in self.alarms[::-1] if one.name == name), None)
-        return f"the alarm of {alarm.seq / self._rate:.2f} s: " if alarm else ""
+        alarm = self._newest((event.text.partition(": ")[0],))
+        return f"{self._called(alarm)}: " if alarm else ""
+
+    def _newest(self, names: Collection[str]) -> Alarm | None:
+        """The newest alarm of one of these names."""
+        return next((one for one in self.alarms[::-1] if one.name in names), None)
+
+    def _called(self, alarm: Alarm) -> str:
+        return f"the alarm of {alarm.seq / self._rate:.2f} s"
 
     def _tell_how_to_study(self, alarm: str, effect: str, port: str) -> None:
         """Say how the effect's strength is found, and how the model gets it."""
@@ -266,9 +289,10 @@ class Narrator:
         self._say(
             "            next, how strong it is (the demo goes on meanwhile): Open as a study,"
         )
-        self._say(
-            "            at the alarm in the workbench, then explain and add it; or by commands:"
-        )
+        address = self._workbench()
+        where = f"the workbench ({address})" if address else "the workbench"
+        self._say(f"            at the alarm in {where},")
+        self._say("            then explain and add it; or by commands:")
         self._say(f"              $ rigwatch explain {study}")
         self._say(f"              $ rigwatch add {study} {effect} --port {port}")
 
@@ -276,6 +300,8 @@ class Narrator:
         """Report the end of an alarm; that of a departure only if no named fault replaced it."""
         if self._ended is not None:
             name = self._ended.name
+            if name == NAMELESS:
+                self._unnamed = None
             what = name.replace("_", " ") if name in OF_THE_RIG else self._ended.cause
             self._say(f"{self._time(self._ended.seq)} {what}: the condition has gone")
             self._tell_how_to_acknowledge(self._ended)

@@ -88,10 +88,17 @@ class Show:
         folder: its files.
         say: called with lines for people.
         attended: people watch until they end it, and can give commands.
+        workbench: gives the address of the workbench, empty without one.
     """
 
     def __init__(
-        self, rig: Path, folder: Path, say: Callable[[str], None], *, attended: bool = True
+        self,
+        rig: Path,
+        folder: Path,
+        say: Callable[[str], None],
+        *,
+        attended: bool = True,
+        workbench: Callable[[], str] = str,
     ) -> None:
         self._rig, self._folder, self._say = rig, folder, say
         self._config = load_rig(rig)
@@ -104,6 +111,7 @@ class Show:
             relative(folder / "studies"),
             known=known_friction(),
             attended=attended,
+            workbench=workbench,
         )
         self._first = self._seen = 0
         self._up: subprocess.Popen[str] | None = None

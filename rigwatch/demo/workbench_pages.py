@@ -6,6 +6,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -15,8 +16,19 @@ from rigwatch.wire.host import end_process
 STOP_TIMEOUT = 10.0
 
 
+@dataclass
+class Pages:
+    """The workbench's pages.
+
+    Attributes:
+        address: where they are opened; empty until they are served, and where they cannot be.
+    """
+
+    address: str = ""
+
+
 @contextmanager
-def workbench_pages(folder: Path, rig: Path, say: Callable[[str], None]) -> Iterator[None]:
+def workbench_pages(folder: Path, rig: Path, say: Callable[[str], None]) -> Iterator[Pages]:
     """Serve the studies of `folder` with the page of a rig for as long as this lasts.
 
     Args:
@@ -24,8 +36,9 @@ def workbench_pages(folder: Path, rig: Path, say: Callable[[str], None]) -> Iter
         rig: its configuration.
         say: told the address.
     """
+    pages = Pages()
     if find_spec("starlette") is None or find_spec("uvicorn") is None:
-        yield
+        yield pages
         return
     studies = folder / "studies"
     studies.mkdir(exist_ok=True)
@@ -39,17 +52,17 @@ def workbench_pages(folder: Path, rig: Path, say: Callable[[str], None]) -> Iter
         text=True,
         process_group=0,
     )
-    threading.Thread(target=_tell, args=(process, say), name="pages", daemon=True).start()
+    threading.Thread(target=_tell, args=(process, pages, say), name="pages", daemon=True).start()
     try:
-        yield
+        yield pages
     finally:
         end_process(process, STOP_TIMEOUT)
         say(f"its studies:   rigwatch workbench {relative(studies)}")
 
 
-def _tell(process: "subprocess.Popen[str]", say: Callable[[str], None]) -> None:
+def _tell(process: "subprocess.Popen[str]", pages: Pages, say: Callable[[str], None]) -> None:
     assert process.stdout is not None
     line = process.stdout.readline()
     if line:
-        address = json.loads(line)["address"]
-        say(f"  workbench: once an alarm has come, open {address} in a browser")
+        pages.address = json.loads(line)["address"]
+        say(f"  workbench: once an alarm has come, open {pages.address} in a browser")

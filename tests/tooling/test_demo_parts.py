@@ -244,6 +244,45 @@ def test_an_explanation_says_which_alarm_it_belongs_to() -> None:
     assert any("the alarm of 20.00 s: probably missing" in line for line in said)
 
 
+def test_an_alarm_that_names_the_fault_of_an_earlier_one_says_so() -> None:
+    said: list[str] = []
+    narrator = narrator_to(said)
+    narrator.alarm(alarm("departure", 20 * RATE))
+    narrator.alarm(alarm("departure", 21 * RATE, "normal"))
+    narrator.alarm(alarm("dry_friction", 21 * RATE))
+    named = [line.strip() for line in said if "this names" in line]
+    assert named == ["(this names the fault behind the alarm of 20.00 s)"]
+    said.clear()
+    narrator.alarm(alarm("dry_friction", 30 * RATE, "normal"))
+    narrator.alarm(alarm("other_fault", 40 * RATE))
+    narrator.alarm(alarm("departure", 50 * RATE))
+    narrator.alarm(replace(alarm("departure", 60 * RATE, "normal"), onset_seq=50 * RATE))
+    narrator.judged(estimates(70 * RATE, 64))
+    narrator.alarm(alarm("other_fault", 80 * RATE))
+    assert not any("this names" in line for line in said)
+
+
+def test_no_line_of_an_explanation_is_longer_than_the_others() -> None:
+    said: list[str] = []
+    rivals = "; ".join(["dahl@load explains as much, and neither is settled"] * 4)
+    found = f"coulomb@load (dry surfaces resist sliding): explains 99% of the change; {rivals}"
+    text = f"dry_friction: probably missing: {found}"
+    narrator_to(said).explain(Event("monitor", 0, "error", PROBABLY_MISSING, text))
+    assert max(map(len, said)) <= 102
+    assert " ".join(line.strip() for line in said).count("neither is settled") == 4
+
+
+def test_the_address_of_the_workbench_is_told_where_it_is_needed() -> None:
+    said: list[str] = []
+    scenario = load_scenario(find_config("scenarios/demo.toml"))
+    narrator = Narrator(
+        scenario, said.append, "rig.toml", "studies", known=0.43, workbench=lambda: "http://here"
+    )
+    text = "dry_friction: probably missing: coulomb@load (dry surfaces resist sliding)"
+    narrator.explain(Event("monitor", 0, "error", PROBABLY_MISSING, text))
+    assert any("at the alarm in the workbench (http://here)," in line for line in said)
+
+
 def test_what_is_missing_in_the_model_is_told_and_other_events_are_not() -> None:
     said: list[str] = []
     narrator = narrator_to(said)
@@ -265,7 +304,8 @@ def test_what_is_missing_in_the_model_is_told_and_other_events_are_not() -> None
         "0.43 N of the recording with known friction, from which its model was made",
         "more about it: $ rigwatch effects coulomb",
         "next, how strong it is (the demo goes on meanwhile): Open as a study,",
-        "at the alarm in the workbench, then explain and add it; or by commands:",
+        "at the alarm in the workbench,",
+        "then explain and add it; or by commands:",
         "$ rigwatch explain demo/studies/dry_friction-*",
         "$ rigwatch add demo/studies/dry_friction-* coulomb --port load",
     ]

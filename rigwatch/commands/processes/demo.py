@@ -43,7 +43,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _run(arguments: argparse.Namespace, folder: Path) -> int:
-    from rigwatch.demo import Show, ensure_model, forget_alarms, workbench_pages, write_rig_file
+    from rigwatch.demo import (
+        Pages,
+        Show,
+        ensure_model,
+        forget_alarms,
+        workbench_pages,
+        write_rig_file,
+    )
     from rigwatch.wire.typed_files import find_config
 
     config = find_config("demo.toml")
@@ -58,9 +65,10 @@ def _run(arguments: argparse.Namespace, folder: Path) -> int:
         seconds, after_named = LONGEST, AFTER_NAMED
     if arguments.seconds is not None:
         seconds, after_named = arguments.seconds, inf
-    beside = nullcontext() if arguments.headless else workbench_pages(folder, rig, say)
-    with beside:
-        show = Show(rig, folder, say, attended=not arguments.headless)
+    beside = nullcontext(Pages()) if arguments.headless else workbench_pages(folder, rig, say)
+    with beside as pages:
+        attended = not arguments.headless
+        show = Show(rig, folder, say, attended=attended, workbench=lambda: pages.address)
         outcome = show.play(seconds, after_named)
     if arguments.json:
         print(json.dumps(outcome.as_dict(), indent=1))
