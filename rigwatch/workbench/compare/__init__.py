@@ -9,7 +9,13 @@ from rigwatch.workbench.compare.decided_hold import (
     with_hold_decided,
 )
 from rigwatch.workbench.compare.horizon import with_horizon_of
-from rigwatch.workbench.compare.locate import Region, locate, motion, sample_numbers
+from rigwatch.workbench.compare.location import (
+    Region,
+    locate,
+    motion,
+    recording_name,
+    sample_numbers,
+)
 from rigwatch.workbench.compare.preparation import (
     Bench,
     bench_of,
@@ -42,6 +48,7 @@ __all__ = [
     "motion",
     "open_bench",
     "prepared",
+    "recording_name",
     "sample_numbers",
     "unweighed",
     "with_base",

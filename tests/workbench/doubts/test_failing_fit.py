@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigwatch.physics.engine.search import Convergence
-from rigwatch.workbench.compare import open_bench
+from rigwatch.workbench.compare import locate, open_bench
 from rigwatch.workbench.explain import ranking
 from rigwatch.workbench.fit import each_recording
 from tests.workbench.machine import Table, studied
@@ -82,3 +82,16 @@ def test_each_recording_is_a_part_with_its_own_windows(tmp_path: Path) -> None:
     for part, own in zip(parts, whole.slices, strict=True):
         np.testing.assert_array_equal(part.data.train.outputs, whole.outputs[own])
         assert len(part.of(bench.base).train.residuals) == len(part.data.train) / 40
+
+
+def test_the_time_at_which_the_model_fails_is_that_of_its_recording(tmp_path: Path) -> None:
+    logs = [log(seed) for seed in range(3)]
+    logs[1]["warmer"][420:460] += 8.0
+    bench = open_bench(studied(tmp_path, BLOCK, logs[:2], logs[2:], UNITS, "horizon = 4.0",
+                               rates=[1 / DT] * 3))  # fmt: skip
+    by_time = [region for region in locate(bench) if region.view == "time"]
+    worst = max(by_time, key=lambda region: region.rms)
+    place = re.fullmatch(r".*train1\.mcap, ([\d.]+) to ([\d.]+) s", worst.name)
+    assert place is not None
+    assert float(place[1]) <= 42.0 < float(place[2]) <= SAMPLES * DT
+    assert {len(region.samples) for region in by_time} == {SAMPLES // 6, SAMPLES // 6 + 1}

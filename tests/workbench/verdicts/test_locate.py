@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rigwatch.workbench.compare.locate import Region, locate
+from rigwatch.workbench.compare.location import Region, locate
 from rigwatch.workbench.compare.preparation import Bench
 from tests.workbench.simulated import multisine, opened
 

@@ -5,7 +5,6 @@ channel that hold more of it than others, and in parameters of which each record
 another value.
 """
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
@@ -13,7 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.compare import Bench, Region, locate
+from rigwatch.workbench.compare import Bench, Region, locate, recording_name
 from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.fit import (
     TrainingPart,
@@ -24,7 +23,7 @@ from rigwatch.workbench.fit import (
     trained,
     values,
 )
-from rigwatch.workbench.study import FILE, Span, told, told_unit
+from rigwatch.workbench.study import FILE, told, told_unit
 
 STANDS_OUT = 1.5
 """Share of the energy over that of the samples from which a part of a recording stands out."""
@@ -77,45 +76,19 @@ def _standing_out(bench: Bench, regions: Sequence[Region]) -> Iterator[str]:
         }
         most = max(over, key=lambda region: over[region], default=None)
         if most is not None and over[most] >= STANDS_OUT:
-            place = _time_of(bench, most) if by_time else _place_of(most)
-            yield f"{most.share:.0%} of it {place}"
+            yield f"{most.share:.0%} of it {_place_of(bench, most)}"
     bands = [region for region in regions if region.view == "frequency"]
     widest = max(bands, key=lambda region: region.share, default=None)
     if widest is not None and widest.share >= NARROW:
         yield f"{widest.share:.0%} of it from {widest.name}"
 
 
-def _place_of(region: Region) -> str:
-    """The part of the motion, or the size of an input, in words."""
+def _place_of(bench: Bench, region: Region) -> str:
+    """The time, the part of the motion, or the size of an input, in words."""
+    if region.view == "time":
+        several = len(bench.data.train.slices) > 1
+        return f"in {region.name}" if several else f"from {region.name}"
     return region.name if region.view == "direction" else f"at {region.name}"
-
-
-def _time_of(bench: Bench, region: Region) -> str:
-    """The time of most samples of a region, in the recording that has most of them."""
-    train = bench.data.train
-    begins = [part.start for part in train.slices]
-    numbers = np.searchsorted(begins, region.samples, side="right") - 1
-    at = Counter(numbers.tolist()).most_common(1)[0][0]
-    own, dt = region.samples[numbers == at] - begins[at], train.own_spacings[at]
-    span = _span(bench, at)
-    first = span.start if span else 0.0
-    low, high = (f"{first + row * dt:.6g}" for row in (own[0], own[-1] + 1))
-    return f"in {_name(bench, at)} from {low} to {high} s"
-
-
-def _name(bench: Bench, at: int) -> str:
-    """The name of a training recording, with its beginning where several are of one session."""
-    span = _span(bench, at)
-    if span is None:
-        return f"recording {at + 1}"
-    several = sum(other.session == span.session for other in bench.study.file.train) > 1
-    return f"{span.session} from {span.start:.6g} s" if several else span.session
-
-
-def _span(bench: Bench, at: int) -> Span | None:
-    """The section of a training recording in the study; None if they are in memory alone."""
-    spans = bench.study.file.train
-    return spans[at] if len(spans) == len(bench.data.train.slices) else None
 
 
 def _disagreed(bench: Bench) -> Iterator[str]:
@@ -148,7 +121,7 @@ def _furthest(bench: Bench, alone: Sequence[dict[str, Value]], name: str) -> tup
     if not far:
         return 0.0, ""
     distance, *pair = max(far)
-    ends = " and ".join(f"{shown(alone[at][name])} in {_name(bench, at)}" for at in pair)
+    ends = " and ".join(f"{shown(alone[at][name])} in {recording_name(bench, at)}" for at in pair)
     return distance, f"{name} is {ends}"
 
 

@@ -13,6 +13,7 @@ from scipy.stats import t as student
 
 from rigwatch.physics.engine.fit import Recording, initial_states
 from rigwatch.wire.arrays import FloatArray, IntArray
+from rigwatch.workbench.compare.location.recording_time import recording_name, recording_time
 from rigwatch.workbench.compare.preparation import Bench
 from rigwatch.workbench.data import find_period
 
@@ -32,7 +33,7 @@ class Region:
         mean: of the residual there, in the channel's unit.
         share: of the residual's energy above the noise floor, 0 to 1.
         p_value: of a mean squared residual this far above the average by chance.
-        samples: sample numbers in the training recording; empty for frequencies.
+        samples: sample numbers, counted through all training recordings; empty for frequencies.
     """
 
     view: str
@@ -59,7 +60,7 @@ def _channel(bench: Bench, channel: str, residual: FloatArray, floor: float) -> 
     recording = bench.data.train
     rows = sample_numbers(recording, len(residual))
     moved = motion(bench, rows)
-    found = _cut(channel, residual, floor, rows, "time", _by_time(residual, rows, recording.dt))
+    found = _cut(channel, residual, floor, rows, "time", _by_time(bench, rows))
     if moved is not None:
         x, v = moved
         views = {
@@ -108,13 +109,19 @@ def motion(bench: Bench, rows: IntArray) -> tuple[FloatArray, FloatArray] | None
     return None
 
 
-def _by_time(residual: FloatArray, rows: IntArray, dt: float) -> list[str]:
-    edges = np.linspace(0, len(residual), PIECES["time"] + 1).astype(int)
-    names = [
-        f"{rows[a] * dt:.3g} to {rows[min(b, len(rows) - 1)] * dt:.3g} s"
-        for a, b in pairwise(edges)
-    ]
-    return [names[i] for i in np.searchsorted(edges, np.arange(len(residual)), side="right") - 1]
+def _by_time(bench: Bench, rows: IntArray) -> list[str]:
+    """The piece of its recording that each sample belongs to; no piece is of two recordings."""
+    numbers, times = recording_time(bench, rows)
+    labels = list[str]()
+    for at in np.unique(numbers).tolist():
+        own = times[numbers == at]
+        pieces = max(round(PIECES["time"] * len(own) / len(rows)), 1)
+        edges = np.linspace(0, len(own), pieces + 1).astype(int)
+        name = f"{recording_name(bench, at)}, " if len(bench.data.train.slices) > 1 else ""
+        for a, b in pairwise(edges):
+            label = f"{name}{own[a]:.4g} to {own[min(b, len(own) - 1)]:.4g} s"
+            labels += [label] * (b - a)
+    return labels
 
 
 def _steps(signal: FloatArray, count: int) -> tuple[IntArray, FloatArray]:
