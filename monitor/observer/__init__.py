@@ -10,9 +10,9 @@ of a known fault. Its part of the model file is declared in `monitor.model`, and
 `monitor.commissioning` creates it from healthy recordings.
 """
 
-from monitor.observer import decision_state
 from monitor.observer.channel_jumps import ChannelJumps, bends_of
-from monitor.observer.decision_state import (
+from monitor.observer.decision import decide, decision_state, friction_limit
+from monitor.observer.decision.decision_state import (
     DEVIATIONS,
     EVIDENCE,
     LASTING,
@@ -44,7 +44,6 @@ from monitor.observer.model_signals import (
     layout_of,
     remainder_signals,
 )
-from monitor.observer.observer_decision import decide, friction_limit
 from monitor.observer.prediction import (
     SETTLING,
     SUBSTEPS,

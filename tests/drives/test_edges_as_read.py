@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from monitor.observer import decision_state as d
-from monitor.observer.decision_state import DecisionRules, new_state
+from monitor.observer.decision import decide
+from monitor.observer.decision.decision_state import DecisionRules, new_state
 from monitor.observer.lagged_motion import FIRST, WHOLE
 from monitor.observer.missing_force import JITTERS, JUDGED, UNSURE_INPUT, E
-from monitor.observer.observer_decision import decide
 from monitor.observer.usual_error import Extremes
 
 N, BEGIN, NOISE = 1536, 1024, 0.15

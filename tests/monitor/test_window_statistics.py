@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from monitor.observer import window_statistics
-from monitor.observer.decision_state import (
+from monitor.observer.decision import window_statistics
+from monitor.observer.decision.decision_state import (
     AT,
     BARE,
     DELAYED,

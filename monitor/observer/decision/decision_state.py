@@ -69,6 +69,11 @@ class Counts(NamedTuple):
 
 
 AT = Counts()
+(
+    HEAD, FILLED, SINCE_START, QUIET, OUTSIDE, ONSET, DEPARTURE_AGO, AGREED, DISAGREED, CHANGED,
+    ABOVE, JUMP_AGO, WAS_JUDGING, LASTED, KNOWN_AGO, GAP_AGO,
+) = range(16)  # fmt: skip
+"""Indices of `Counts` as constants for the kernel."""
 
 
 class DecisionState(NamedTuple):

@@ -5,18 +5,22 @@
 
 import numpy as np
 
-from monitor.observer.decision_state import (
+from monitor.observer.decision.decision_state import (
     BARE,
     DELAYED,
     DRIVEN,
     DRY,
     ERROR,
+    FILLED,
+    HEAD,
     HISTORY,
+    LASTED,
     LASTING,
     MEDIUM,
     RISING,
     SPEED,
     SUMS,
+    WAS_JUDGING,
     WET,
     DecisionState,
 )
@@ -38,8 +42,6 @@ ALIKE = 0.82
 tell them apart: about 2/π under Gaussian noise, and at least 8/π² under a tone, where any small
 error of the equations decides how much looks dry.
 """
-HEAD, FILLED, WAS_JUDGING, LASTED = 0, 1, 12, 13
-"""Indices of `decision_state.Counts` as constants for the kernel."""
 BURST = 3.0
 """Largest energy of a sample that counts for a lasting change, relative to the limit."""
 SHORTEST = 4
