@@ -13,7 +13,13 @@ from rerun.experimental import ViewerClient
 
 from rigwatch.dashboard.board import NAMED_FAULTS, Dashboard, Facts, Windows, is_active
 from rigwatch.dashboard.board import entities as at
-from rigwatch.dashboard.viewer import RECORDING_MEMORY, Viewer, await_data, save_picture
+from rigwatch.dashboard.viewer import (
+    RECORDING_MEMORY,
+    Viewer,
+    await_data,
+    await_drawing,
+    save_picture,
+)
 from rigwatch.wire.messages import Alarm, Message
 
 _FLUSH_AFTER = 16384
@@ -118,6 +124,6 @@ def headless_viewer() -> Viewer:
     """A viewer that draws into memory; needs a graphics driver, such as Mesa's software one.
 
     Raises:
-        ViewerError: it does not start.
+        ViewerError: it does not start, or draws nothing.
     """
-    return Viewer("headless", memory=RECORDING_MEMORY).await_answer()
+    return await_drawing(Viewer("headless", memory=RECORDING_MEMORY).await_answer())

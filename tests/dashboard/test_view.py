@@ -42,6 +42,20 @@ def test_the_picture_shows_signals_and_verdict(
     assert picture.stat().st_size < 400_000
 
 
+def test_without_a_graphics_driver_it_is_told_what_a_picture_needs(
+    session: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("WGPU_BACKEND", "dx12")  # of another system
+    picture = tmp_path / "rubbing.png"
+    assert main(["view", str(session), "--picture", str(picture)]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "it needs a graphics driver" in said
+    assert not picture.exists()
+
+
 def test_a_file_for_the_viewer_holds_the_whole_recording(
     session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,5 +1,6 @@
 """What a viewer shows: when it has received its data, and as a picture."""
 
+import contextlib
 import io
 import time
 from pathlib import Path
@@ -7,7 +8,7 @@ from pathlib import Path
 from PIL import Image
 from rerun.experimental import ViewerClient
 
-from rigwatch.dashboard.viewer.viewer import ViewerError
+from rigwatch.dashboard.viewer.viewer import Viewer, ViewerError
 from rigwatch.wire.new_file import new_file
 
 _EMPTY_TOP = 36
@@ -17,6 +18,28 @@ _FRAMES, _FRAME = 48, 0.125
 
 
 _ARRIVAL_TIMEOUT = 60.0
+_NEEDS = (
+    "it needs a graphics driver, such as Mesa's for machines without a graphics card"
+    " (mesa-vulkan-drivers)"
+)
+
+
+def await_drawing(viewer: Viewer) -> Viewer:
+    """Wait until a viewer without a window draws; returns it.
+
+    It answers before it draws, and ends without a word where the graphics driver is missing.
+
+    Raises:
+        ViewerError: it ended, or draws nothing in time; it is stopped.
+    """
+    deadline = time.monotonic() + _ARRIVAL_TIMEOUT
+    while viewer.exit_code() is None and time.monotonic() < deadline:
+        with contextlib.suppress(ConnectionError):
+            ViewerClient.connect(viewer.url).take_screenshot()
+            return viewer
+        time.sleep(0.1)
+    viewer.stop()
+    raise ViewerError(f"the viewer draws no picture: {_NEEDS}")
 
 
 def await_data(client: ViewerClient, timeline: str, end_ns: float) -> None:
