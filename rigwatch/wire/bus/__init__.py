@@ -47,6 +47,7 @@ from rigwatch.wire.bus.member import unique_process
 from rigwatch.wire.bus.message_ring import SAID_KEY
 from rigwatch.wire.bus.ring_questions import RingQuestions
 from rigwatch.wire.bus.subscription import MOST_COMMANDS, QUEUE_CAPACITY, Subscription
+from rigwatch.wire.bus.tokens import sender_named
 from rigwatch.wire.bus.transport import DENIED_MARK, MAX_PAYLOAD, REFUSED_MARK, Close
 
 __all__ = [
@@ -91,6 +92,7 @@ __all__ = [
     "marked",
     "open_router",
     "proved_here",
+    "sender_named",
     "serve_alarm_list",
     "serve_shelf",
     "shelf_line",
