@@ -8,7 +8,6 @@ supervisor.py  all processes: restart with back-off, status, orderly stop
 config_watch.py  a change of the configuration restarts what it concerns
 rig_set.py     rigs and processes join and leave with their files and sections
 console.py     events and status as lines
-printer.py     prints them without waiting for who reads
 """
 
 from rigwatch.supervisor.config_watch import ConfigWatch

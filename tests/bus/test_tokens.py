@@ -167,7 +167,8 @@ def test_a_ring_that_tells_a_number_beyond_all_messages_ends_no_listener():
     monitor, stranger = network.bus("r", "monitor"), network.bus("r", "stranger")
     say(monitor, range(1))
     run = monitor._numbered().run
-    end = stranger.serve("ring/monitor/alarms", lambda _: [RingReply(run, 2**63 - 1, ()).to_bytes()])
+    reply = RingReply(run, 2**63 - 1, ()).to_bytes()
+    end = stranger.serve("ring/monitor/alarms", lambda _: [reply])
     listener = network.bus("r", "listener").listen(ALARMS)
     end()
     say(monitor, range(1, 5))

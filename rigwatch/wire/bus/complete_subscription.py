@@ -287,7 +287,7 @@ class CompleteSubscription(Subscription):
             self._handle(process, peer.vanished(run, since_ns))
 
     def _begin_run(self, run: int, process: str) -> None:
-        """Note that a process calls a run its own: others may do so too, which costs them nothing."""
+        """Note that a process calls a run its own; others may do so too, as runs are no secret."""
         self._ended.pop((run, process), None)
         if process not in (names := self._runs.setdefault(run, [])):
             names.append(process)

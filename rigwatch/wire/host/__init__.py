@@ -1,4 +1,4 @@
-"""The host: notifications, priority, threads of rigs, ports, signals, files, locks, clocks."""
+"""The host: notifications, priority, threads, ports, signals, files, output, locks, clocks."""
 
 from rigwatch.wire.host.both_clocks import both_clocks
 from rigwatch.wire.host.disk_space import free_share
@@ -12,6 +12,7 @@ from rigwatch.wire.host.few_pools import (
 from rigwatch.wire.host.heartbeat import NO_ROUTER, WAITS, Heartbeat, waits_for_samples, waits_of
 from rigwatch.wire.host.one_keeper import Hold, Kept
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
+from rigwatch.wire.host.printer import Printer
 from rigwatch.wire.host.processes import end_process, end_with_parent, last_line
 from rigwatch.wire.host.realtime import (
     DAQ,
@@ -34,6 +35,7 @@ __all__ = [
     "Hold",
     "Kept",
     "Part",
+    "Printer",
     "Pulse",
     "RigPulse",
     "Work",
