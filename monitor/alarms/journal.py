@@ -4,8 +4,8 @@
 
 Each write ends with fsync, so everything published is on disk. A line torn by a kill or a power cut
 has no newline or is not valid JSON: reading skips and counts it, and writing continues on a new
-line. So it does with one whose numbers or words no message can hold, as of a damaged disk. Non-finite
-numbers are written as the strings "nan", "inf" and "-inf".
+line. So it does with one whose numbers or words no message can hold, as of a damaged disk.
+Non-finite numbers are written as the strings "nan", "inf" and "-inf".
 """
 
 import errno

@@ -59,16 +59,31 @@ def config(tmp_path: Path) -> Path:
 
 
 @contextmanager
-def service(name: str, config: Path, systemd: Path | None = None) -> Iterator[None]:
+def service(name: str, config: Path, systemd: Path | None = None, *options: str) -> Iterator[None]:
     """A process of the rig as systemd starts it."""
     environment = {**os.environ, **({"NOTIFY_SOCKET": str(systemd)} if systemd else {})}
-    command = [sys.executable, "-m", "rigwatch", name, str(config)]
+    command = [sys.executable, "-m", "rigwatch", name, str(config), *options]
     with subprocess.Popen(command, env=environment) as running:
         try:
             yield
         finally:
             running.terminate()
-            assert running.wait(timeout=20) == 0
+            assert running.wait(timeout=60) == 0
+
+
+def test_a_whole_rig_without_its_device_is_not_started_anew(config: Path, tmp_path: Path) -> None:
+    systemd = Systemd(tmp_path / "notify")
+    without = "--without=plant", "--without=dashboard", "--without=monitor"
+    with service("up", config, systemd.place, *without):
+        systemd.until(lambda line: line == "READY=1", "all are ready without the device")
+        systemd.until(lambda line: line.startswith("STATUS=waits: "), "daq says that it waits")
+        waited, fed = time.monotonic(), len(systemd.fed_at)
+        systemd.until(lambda _: time.monotonic() - waited > 5.0, "it goes on")
+        times = systemd.fed_at[fed:]
+        assert max(b - a for a, b in itertools.pairwise(times)) < 0.5 * WATCHDOG_S
+        server = SerialServer(Device(ToySource()), PtyLine(tmp_path / "serial-line"))
+        with in_thread(server.run):
+            systemd.until(lambda line: line == "STATUS=running", "the device is found")
 
 
 def test_a_daq_without_its_device_waits_and_is_not_restarted(config: Path, tmp_path: Path) -> None:
