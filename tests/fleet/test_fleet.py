@@ -69,6 +69,18 @@ def test_processes_that_are_made_up_are_bounded_and_those_of_the_rig_are_heard(t
     assert len(onlooker._last) == MOST_SOURCES + 1
 
 
+def test_a_rig_whose_keys_cannot_be_read_hides_no_other(tmp_path: Path):
+    paths = [rig_file(tmp_path, "plain"), rig_file(tmp_path, "keyed")]
+    text = paths[1].read_text().replace("tcp/", "tls/")
+    paths[1].write_text(f'{text}\n[bus.security]\nkeys = "{tmp_path}/none"\n')
+    fleet = Fleet(paths, timeout=0.2)
+    states = {state.rig: state for state in fleet.states()}
+    fleet.close()
+    assert "no router answers" in states["plain"].state
+    assert states["keyed"].rank == UNREACHABLE
+    assert "no such file; `rigwatch keys issue" in states["keyed"].state
+
+
 @pytest.fixture
 def rigs(tmp_path: Path):
     """A rig that runs, one whose daq is not there, and one without a router."""
