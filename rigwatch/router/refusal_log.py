@@ -58,7 +58,8 @@ class RefusalLog:
         self._pass_on(self._rest)
 
     def _pass_on(self, other: bytes) -> None:
-        for line in other.splitlines(keepends=True) if self._printer else ():
+        assert self._printer is not None
+        for line in other.splitlines(keepends=True):
             self._printer.print(line.decode(errors="replace"))
 
     def take(self, chunk: bytes) -> bytes:
