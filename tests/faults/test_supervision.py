@@ -198,7 +198,7 @@ def test_a_folder_of_configurations_that_does_not_answer_ends_no_rig(
     rigs = [(path, load_rig(path)) for path in paths]
     supervisor, told = Supervisor([], lambda _: None), list[str]()
     rig_set = RigSet(paths, rigs, (), supervisor, told.append)
-    stat, clock = Path.stat, time.monotonic
+    stat, began = Path.stat, time.monotonic()
 
     def stale(path: Path, **options: bool) -> os.stat_result:
         if path in paths:
@@ -207,7 +207,7 @@ def test_a_folder_of_configurations_that_does_not_answer_ends_no_rig(
 
     monkeypatch.setattr(Path, "stat", stale)
     for seconds in (1.0, 2.0 + GONE_AFTER):
-        monkeypatch.setattr(time, "monotonic", lambda now=clock() + seconds: now)
+        monkeypatch.setattr(time, "monotonic", lambda now=began + seconds: now)
         rig_set.check()
     assert told == []
     assert list(rig_set._rigs) == paths

@@ -104,6 +104,20 @@ def test_a_full_socket_does_not_block(supervisor: socket.socket) -> None:
     assert said(supervisor)
 
 
+def test_what_a_late_supervisor_could_not_take_is_said_again(supervisor: socket.socket) -> None:
+    clock = Clock()
+    beat = heartbeat(supervisor, clock)
+    for turn in range(10_000):  # nobody reads: the socket takes no more
+        beat.advance(turn + 1)
+        clock.now += INTERVAL
+    clock.now += WAITS_AFTER
+    beat.advance(10_000, "the device is not open")
+    said(supervisor)
+    clock.now += INTERVAL
+    beat.advance(10_000, "the device is not open")
+    assert f"STATUS={WAITS}the device is not open" in said(supervisor)[0]
+
+
 def ready(supervisor: Supervisor, name: str) -> None:
     """What a process of this name reports that runs."""
     watched = supervisor.processes[name]

@@ -18,7 +18,7 @@ from rigwatch.supervisor.plan import ProcessPlan
 from rigwatch.supervisor.supervisor import ProcessEvent, Supervisor, how_it_ended
 from rigwatch.supervisor.vitals import Limits, Vitals
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.wire.host import NO_ROUTER, WAITS, waits_of
+from rigwatch.wire.host import NO_ROUTER, NO_SAMPLES, WAITS, waits_of
 
 LIMITS = Limits(start=20, silence=1.0, stall=1.5, stop=2, first_pause=0.1, settled=3)
 
@@ -242,6 +242,16 @@ def test_a_process_that_says_its_device_is_gone_is_not_started_again_for_having_
         source.take(f"X_RIGWATCH_COUNT={now * 256:.0f}", now=now)
         daq.take("STATUS=running\nX_RIGWATCH_COUNT=5", now=now)
         assert bool(daq.complaint(source, now, LIMITS)) == (now > seconds[-1] + LIMITS.stall)
+
+
+def test_a_daq_that_gets_nothing_of_a_simulated_device_that_has_samples_is_started_again() -> None:
+    source, daq = Vitals(0.0), Vitals(0.0, reads_device=True)
+    for vitals in (source, daq):
+        vitals.take("READY=1\nX_RIGWATCH_COUNT=5", now=1.0)
+    for turn in range(8, 16):
+        source.take(f"X_RIGWATCH_COUNT={turn * 64}", now=0.25 * turn)
+        daq.take(f"STATUS={WAITS}{NO_SAMPLES}\nX_RIGWATCH_COUNT=5", now=0.25 * turn)
+    assert "takes no samples" in daq.complaint(source, 0.25 * 15, LIMITS)
 
 
 def test_a_process_that_waits_for_its_router_is_not_started_again_for_having_no_samples() -> None:

@@ -9,7 +9,15 @@ from rigwatch.wire.host.few_pools import (
     tidy_memory,
     use_few_pools,
 )
-from rigwatch.wire.host.heartbeat import NO_ROUTER, WAITS, Heartbeat, waits_for_samples, waits_of
+from rigwatch.wire.host.heartbeat import (
+    DEVICE_SILENT,
+    NO_ROUTER,
+    NO_SAMPLES,
+    WAITS,
+    Heartbeat,
+    waits_for_samples,
+    waits_of,
+)
 from rigwatch.wire.host.one_keeper import Hold, Kept
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
 from rigwatch.wire.host.printer import Printer
@@ -27,8 +35,10 @@ from rigwatch.wire.host.whole_file import replace_file, write_through
 
 __all__ = [
     "DAQ",
+    "DEVICE_SILENT",
     "MONITOR",
     "NO_ROUTER",
+    "NO_SAMPLES",
     "ROUTER",
     "WAITS",
     "Heartbeat",
