@@ -16,11 +16,14 @@ from daq.known_device import KnownDevice, device_file
 from daq.publisher import Publisher
 from daq.supervisor import Supervisor
 from daq.turns import Turns
+from daq.watch import Link
 from rigwatch.wire.bus import Bus, joined
 from rigwatch.wire.delivery import SampleRing
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.host import (
     DAQ,
+    DEVICE_SILENT,
+    NO_SAMPLES,
     Heartbeat,
     Pulse,
     prepare_for_real_time,
@@ -57,8 +60,14 @@ class Chain:
             self._publisher.publish(self._known.events())
             counters = {**counters, **self._desk.counters}
         self._publisher.publish(self.acquisition.tick(time.monotonic_ns(), link, counters))
-        waits = "" if link.connected and not link.text else link.text or "the device is not open"
-        self._pulse.advance(self.acquisition.samples, waits)
+        self._pulse.advance(self.acquisition.samples, _waits(link, self.acquisition.watch.state))
+
+
+def _waits(link: Link, state: str) -> str:
+    """Why no samples come of the device, whose line a start anew would only open again."""
+    if not link.connected or link.text:
+        return link.text or "the device is not open"
+    return NO_SAMPLES if state in DEVICE_SILENT else ""
 
 
 def _checked(config: RigConfig, adapter: Adapter, source: str) -> KnownDevice | None:

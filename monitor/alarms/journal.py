@@ -4,17 +4,19 @@
 
 Each write ends with fsync, so everything published is on disk. A line torn by a kill or a power cut
 has no newline or is not valid JSON: reading skips and counts it, and writing continues on a new
-line. Non-finite numbers are written as the strings "nan", "inf" and "-inf".
+line. So it does with one whose numbers or words no message can hold, as of a damaged disk.
+Non-finite numbers are written as the strings "nan", "inf" and "-inf".
 """
 
 import errno
 import json
 import math
 import os
+import shutil
 from collections.abc import Iterable, Iterator
 from dataclasses import MISSING, asdict, fields
 from pathlib import Path
-from typing import Any, BinaryIO, get_type_hints
+from typing import Any, BinaryIO, Literal, get_args, get_origin, get_type_hints
 
 from monitor.alarms.record import AlarmRecord
 from rigwatch.wire.errors import SessionError, reason_of
@@ -23,6 +25,7 @@ from rigwatch.wire.new_file import sync
 
 _ALARM_TYPES = get_type_hints(Alarm)
 _RECORD_TYPES = get_type_hints(AlarmRecord)
+_INTEGERS = range(-(2**63), 2**63)
 LARGEST, KEPT = 16 << 20, 8
 """Size at which a journal is rotated [bytes], and number of older files kept."""
 LONGEST_LINE = 1 << 16
@@ -115,14 +118,25 @@ class AlarmJournal:
         """
         beside, file = self._fresh()
         try:
+            copy = self._copied()
             for number in range(KEPT - 1, 0, -1):
                 if (older := self._set_aside(number)).exists():
                     older.replace(self._set_aside(number + 1))
-            self._set_aside(1).hardlink_to(self.path)
+            copy.replace(self._set_aside(1))
         except OSError:
             os.close(file)
             raise
         self._take(beside, file)
+
+    def _copied(self) -> Path:
+        """The file under another name too; it is there before older ones make room for it."""
+        copy = self._set_aside(0)
+        copy.unlink(missing_ok=True)
+        try:
+            copy.hardlink_to(self.path)
+        except OSError:  # a file system without links, as of a memory card
+            shutil.copyfile(self.path, copy)
+        return copy
 
     def _begin_anew(self) -> int:
         """Somebody has removed the file: what is written to it now would be lost without an error.
@@ -268,7 +282,14 @@ def _typed(plain: dict[str, Any], kind: type, types: dict[str, Any]) -> dict[str
     known = [one.name for one in fields(kind) if one.name in plain or one.default is MISSING]
     for name in [name for name in known if name != "alarm"]:
         value = float(plain[name]) if types[name] is float else plain[name]
-        if isinstance(types[name], type) and not isinstance(value, types[name]):
+        if not _is_of(types[name], value):
             raise TypeError(name)
         typed[name] = value
     return typed
+
+
+def _is_of(kind: Any, value: object) -> bool:
+    """Whether a value is of the type of a field, and a message can hold it."""
+    if get_origin(kind) is Literal:
+        return value in get_args(kind)
+    return isinstance(value, kind) and (not isinstance(value, int) or value in _INTEGERS)

@@ -51,8 +51,10 @@ from rigwatch.wire.bus import (
 from rigwatch.wire.delivery import POSITION_WRONG, Item, SampleReader
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.host import (
+    DEVICE_SILENT,
     MONITOR,
     NO_ROUTER,
+    NO_SAMPLES,
     Heartbeat,
     Kept,
     both_clocks,
@@ -161,8 +163,11 @@ class MonitorProcess:
         return min(left, TURN) if left > 0.0 else TURN
 
     def waits(self) -> str:
-        """Why there are no samples to come; empty if daq runs and has a device."""
-        return self._daq_trouble if self._daq_there() else self._absence("daq")
+        """Why there are no samples to come; empty if daq runs and has some of its device."""
+        if not self._daq_there():
+            return self._absence("daq")
+        silent = self._daq is not None and self._daq.state in DEVICE_SILENT
+        return self._daq_trouble or (NO_SAMPLES if silent else "")
 
     def keep_position(self) -> None:
         """Store the position; all samples read so far have been processed.

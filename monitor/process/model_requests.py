@@ -11,9 +11,17 @@ from msgspec import structs
 from monitor.model import RigModel, model_text, parse_model
 from monitor.model import model_versions as versions
 from monitor.pipeline import RigMonitor, check_can_follow
-from rigwatch.wire.bus import KEY, PATIENCE, Bus, CommandCheck, ModelReply, ModelRequest
+from rigwatch.wire.bus import (
+    KEY,
+    LARGEST_NUMBERED,
+    PATIENCE,
+    Bus,
+    CommandCheck,
+    ModelReply,
+    ModelRequest,
+)
 from rigwatch.wire.errors import ModelError, RigwatchError
-from rigwatch.wire.messages import LONGEST_NAME, LONGEST_TEXT, Identity, ModelChange
+from rigwatch.wire.messages import LONGEST_NAME, LONGEST_TEXT, Identity, ModelChange, encode
 from rigwatch.wire.typed_files import JsonError, json_value
 from rigwatch.wire.wiring_names import WIRING
 
@@ -107,9 +115,9 @@ class ModelDesk:
 
     def _apply(self, request: ModelRequest, identity: Identity, place: Place) -> ModelChange:
         """Apply one request; the file is written first, so the model survives a restart."""
-        previous = self._rig.model
         model = self._requested_model(request)
-        check_can_follow(previous, model)
+        check_can_follow(self._rig.model, model)
+        change = self._change(request, identity, place, model)
         author = versions.Author(request.user, request.text, identity)
         if request.action == "rollback":
             versions.roll_back(self._path, place.t_ns, author)
@@ -117,7 +125,17 @@ class ModelDesk:
             step = request.action
             versions.install(self._path, _text(request, model), place.t_ns, author, step)
         self._rig.adopt(model)
-        return ModelChange(
+        return change
+
+    def _change(
+        self, request: ModelRequest, identity: Identity, place: Place, model: RigModel
+    ) -> ModelChange:
+        """The message about it, without the previous model where it has no room for both.
+
+        Raises:
+            ModelError: it has none for the new one either; a recording would not know of it.
+        """
+        change = ModelChange(
             place.device,
             place.boot,
             place.seq,
@@ -125,9 +143,14 @@ class ModelDesk:
             request.user,
             request.text or request.action,
             model_text(model),
-            model_text(previous),
+            model_text(self._rig.model),
             identity,
         )
+        change = change if _fits(change) else replace(change, previous="")
+        if not _fits(change):
+            size = f"{len(change.model)} characters, more than can be told"
+            raise ModelError(f"the model has {size}: commission it with shorter or fewer periods")
+        return change
 
     def _requested_model(self, request: ModelRequest) -> RigModel:
         if request.action == "rollback":
@@ -154,6 +177,10 @@ class ModelDesk:
 def _text(request: ModelRequest, model: RigModel) -> str:
     """The model file's text; a promoted one is kept as it came."""
     return request.model if request.action == "promote" else model_text(model)
+
+
+def _fits(change: ModelChange) -> bool:
+    return len(encode(change)) <= LARGEST_NUMBERED
 
 
 def _bounded(request: ModelRequest) -> ModelRequest:

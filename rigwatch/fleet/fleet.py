@@ -8,8 +8,8 @@ from pathlib import Path
 
 from rigwatch.fleet.rig_state import RigState, judged, unreachable
 from rigwatch.wire.bus import Bus, Subscription, ask_alarm_list, connect, unique_process
-from rigwatch.wire.errors import BusError, ConfigError
-from rigwatch.wire.messages import ALIVE_KEY, HEALTH, Health
+from rigwatch.wire.errors import BusError, ConfigError, RigwatchError
+from rigwatch.wire.messages import ALIVE_KEY, HEALTH, Health, is_remembered
 from rigwatch.wire.rig_config import RigConfig, load_rig
 from rigwatch.wire.several_rigs import apart, valid_rigs
 
@@ -42,7 +42,7 @@ class Onlooker:
         rig, path = self._config.rig.id, str(self._path)
         try:
             bus = self._joined()
-        except BusError as error:
+        except RigwatchError as error:  # no router, or keys that cannot be read
             return unreachable(rig, path, str(error))
         if not bus.connected():
             return unreachable(rig, path, f"the router at {self._config.bus.router} is away")
@@ -90,7 +90,8 @@ class Onlooker:
 
     def _take(self, health: Health) -> None:
         name = health.source.partition("/")[0]
-        self._last[name], self._heard_at[name] = health, time.monotonic()
+        if name in self._heard_at or is_remembered(self._last, name):
+            self._last[name], self._heard_at[name] = health, time.monotonic()
 
     def close(self) -> None:
         """Leave the rig's bus."""

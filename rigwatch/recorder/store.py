@@ -8,6 +8,8 @@ in a new segment. These faults are not raised but returned as events.
 """
 
 from collections import deque
+from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 
 from rigwatch.wire.errors import SessionError, reason_of
@@ -22,7 +24,7 @@ COMPACTED = 256
 RETRY_AFTER = 1.0
 """Time between write attempts [s]."""
 _PLAIN_MESSAGE = 500
-_PER_VALUE = 9
+_PER_VALUE, _PER_COUNTER = 9, 100
 
 
 def weight(message: Message) -> int:
@@ -31,7 +33,15 @@ def weight(message: Message) -> int:
         return _PLAIN_MESSAGE + len(message) * _PER_VALUE * (len(message.channels) + 2)
     if isinstance(message, EstimateBlock):
         return _PLAIN_MESSAGE + len(message) * _PER_VALUE * (len(message.columns) + 1)
-    return _PLAIN_MESSAGE
+    values = (getattr(message, one.name) for one in fields(message))
+    return _PLAIN_MESSAGE + sum(_weight_of(value) for value in values)
+
+
+def _weight_of(value: object) -> int:
+    """That of a field, if it is a text or the counters of a process [bytes]."""
+    if isinstance(value, Mapping):
+        return sum(_PER_COUNTER + len(name) for name in value)
+    return len(value) if isinstance(value, str) else 0
 
 
 class Store:

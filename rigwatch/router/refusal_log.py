@@ -1,7 +1,8 @@
 """Counts refused connections and messages in Zenoh's log, which is the only place that shows them.
 
 The process's standard output is led through a pipe. Lines about refusals are counted and removed;
-everything else is passed on.
+everything else is passed on. The pipe is emptied whatever becomes of the output: Zenoh waits while
+it is full, and with it all that the router forwards.
 """
 
 import fcntl
@@ -9,6 +10,7 @@ import os
 import threading
 
 from rigwatch.wire.bus import DENIED_MARK, REFUSED_MARK, log_refusals
+from rigwatch.wire.host import Printer
 
 PIPE_BYTES = 1 << 20
 LONGEST_LINE = 1 << 16
@@ -27,11 +29,13 @@ class RefusalLog:
         self.connections = self.messages = 0
         self._rest = b""
         self._through = -1
+        self._printer: Printer | None = None
         self._thread: threading.Thread | None = None
 
     def open(self) -> None:
         """Lead standard output through the counter."""
         self._through = os.dup(_STDOUT)
+        self._printer = Printer(self._through, _unprinted)
         reading, writing = os.pipe()
         fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
         os.dup2(writing, _STDOUT)
@@ -45,12 +49,18 @@ class RefusalLog:
         if self._thread:
             os.dup2(self._through, _STDOUT)
             self._thread.join()
+        if self._printer:
+            self._printer.close()
 
     def _run(self, reading: int) -> None:
         while chunk := os.read(reading, PIPE_BYTES):
-            if other := self.take(chunk):
-                os.write(self._through, other)
-        os.write(self._through, self._rest)
+            self._pass_on(self.take(chunk))
+        self._pass_on(self._rest)
+
+    def _pass_on(self, other: bytes) -> None:
+        assert self._printer is not None
+        for line in other.splitlines(keepends=True):
+            self._printer.print(line.decode(errors="replace"))
 
     def take(self, chunk: bytes) -> bytes:
         """Count the refusals in the next bytes of the log; returns all other complete lines."""
@@ -65,3 +75,8 @@ class RefusalLog:
             return b""
         others = (line for line in lines if DENIED_MARK not in line and REFUSED_MARK not in line)
         return b"".join(line + b"\n" for line in others)
+
+
+def _unprinted(count: int) -> str:
+    """What is printed in place of so many lines."""
+    return f"{count} lines of the router's log could not be printed\n"

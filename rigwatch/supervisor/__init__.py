@@ -8,11 +8,12 @@ supervisor.py  all processes: restart with back-off, status, orderly stop
 config_watch.py  a change of the configuration restarts what it concerns
 rig_set.py     rigs and processes join and leave with their files and sections
 console.py     events and status as lines
-printer.py     prints them without waiting for who reads
+own_heartbeat.py  what the supervisor reports to its own parent
 """
 
 from rigwatch.supervisor.config_watch import ConfigWatch
 from rigwatch.supervisor.console import Console, Flow
+from rigwatch.supervisor.own_heartbeat import OwnHeartbeat
 from rigwatch.supervisor.plan import PROCESSES, ProcessPlan, plan
 from rigwatch.supervisor.rig_set import RigSet, planned
 from rigwatch.supervisor.several import plan_several
@@ -23,6 +24,7 @@ __all__ = [
     "ConfigWatch",
     "Console",
     "Flow",
+    "OwnHeartbeat",
     "ProcessPlan",
     "RigSet",
     "Supervisor",

@@ -49,7 +49,11 @@ class Child:
         return self._process.pid if self._process else 0
 
     def start(self, now: float) -> None:
-        """Start it; it dies with this process, but gets no Ctrl-C from the terminal."""
+        """Start it; it dies with this process, but gets no Ctrl-C from the terminal.
+
+        Raises:
+            OSError: its program is not there, or there is no room for another process.
+        """
         self.close_run()
         environment = {k: v for k, v in os.environ.items() if not k.startswith("WATCHDOG_")}
         environment |= {"NOTIFY_SOCKET": self._address, "PYTHONUNBUFFERED": "1"}
@@ -57,17 +61,22 @@ class Child:
         self.last_line = ""
         self._output, writing = os.pipe()
         os.set_blocking(self._output, False)
-        self._process = subprocess.Popen(
-            self.plan.arguments,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=writing,
-            stderr=writing,
-            process_group=0,
-            # It takes no lock that another thread may hold.
-            preexec_fn=partial(die_with, os.getpid()),  # noqa: PLW1509
-        )
-        os.close(writing)
+        try:
+            self._process = subprocess.Popen(
+                self.plan.arguments,
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=writing,
+                stderr=writing,
+                process_group=0,
+                # It takes no lock that another thread may hold.
+                preexec_fn=partial(die_with, os.getpid()),  # noqa: PLW1509
+            )
+        except OSError:
+            os.close(self._output)
+            raise
+        finally:
+            os.close(writing)
 
     def listen(self, now: float) -> None:
         """Read its notifications since the last call."""

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import TextIO
 
-from rigwatch.supervisor.printer import Printer
 from rigwatch.supervisor.supervisor import ProcessEvent, Supervisor
+from rigwatch.wire.host import Printer
 
 NAME_WIDTH = 10
 STATUS_EVERY_TERMINAL = 1.0

@@ -5,6 +5,7 @@ file of a rig ─▶ removed           ─▶ its rig leaves     ├▶ the supe
 file of a rig ─▶ section more, less ─▶ a process more, less /
 """
 
+import stat
 import time
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
@@ -57,7 +58,7 @@ class RigSet:
         if now - self._checked_at < INTERVAL or len(self._paths) == 1:
             return
         self._checked_at = now
-        self._there |= {path: now for path in self._paths if path.is_file()}
+        self._there |= {path: now for path in self._paths if _is_there(path)}
         for path in self._paths:
             if path in self._wrong:
                 self._join(path)
@@ -100,6 +101,16 @@ class RigSet:
 
     def _plans(self) -> list[ProcessPlan]:
         return planned(self._paths, list(self._rigs.items()), self._without)
+
+
+def _is_there(path: Path) -> bool:
+    """Whether there is such a file, as far as can be told: a share may not answer for a while."""
+    try:
+        return stat.S_ISREG(path.stat().st_mode)
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError:
+        return True
 
 
 def planned(paths: Sequence[Path], rigs: Rigs, without: Collection[str]) -> list[ProcessPlan]:

@@ -23,7 +23,7 @@ from typing import Literal
 from rigwatch.supervisor.child import Child
 from rigwatch.supervisor.plan import ProcessPlan
 from rigwatch.supervisor.vitals import Limits, Vitals
-from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.errors import RigwatchError, reason_of
 
 Kind = Literal[
     "started",
@@ -267,7 +267,12 @@ class Supervisor:
 
     def _start(self, watched: Watched) -> None:
         watched.start_at, watched.was_ready, watched.held = None, False, False
-        watched.child.start(self._clock())
+        try:
+            watched.child.start(self._clock())
+        except OSError as error:  # the others go on
+            self._say(watched, "ill", f"cannot be started: {reason_of(error)}")
+            self._pause(watched, self._clock())
+            return
         self._say(watched, "started", f"process {watched.child.pid}")
 
     def _stop_all(self) -> None:

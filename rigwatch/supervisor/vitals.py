@@ -8,7 +8,7 @@ source or its router is healthy.
 import math
 from dataclasses import dataclass, field
 
-from rigwatch.wire.host import NO_ROUTER, WAITS
+from rigwatch.wire.host import NO_ROUTER, NO_SAMPLES, WAITS
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,9 @@ class Vitals:
                 self.status = value
             elif name == "X_RIGWATCH_COUNT" and value.isdigit():
                 self._count(int(value), now)
-        waits = self.reads_device and self.status.startswith(WAITS)
+        # A simulated device that runs is not silent by itself: then daq may have the wrong line.
+        absent = self.status.startswith(WAITS) and self.status != WAITS + NO_SAMPLES
+        waits = self.reads_device and absent
         if waits or self.status == WAITS + NO_ROUTER:
             self.waited_at = now
 

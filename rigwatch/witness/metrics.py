@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rigwatch.wire.access import authority_file, key_files
 from rigwatch.wire.errors import ConfigError, MissingExtraError, RigwatchError, reason_of
-from rigwatch.wire.messages import Alarm, Health, remember
+from rigwatch.wire.messages import MOST_FIGURES, Alarm, Health, is_remembered, remember
 from rigwatch.wire.rig_config import SecuritySection
 
 if TYPE_CHECKING:
@@ -20,8 +20,6 @@ _log = logging.getLogger(__name__)
 _LOOPBACK = ("127.0.0.1", "::1", "localhost")
 ALIVE_S = 5.0
 """Age of a health message up to which its process counts as alive [s]."""
-MOST_SOURCES, MOST_FIGURES = 32, 100
-"""Processes, and figures of one, that are stored."""
 
 
 class Figures:
@@ -52,7 +50,7 @@ class Figures:
     def take_health(self, health: Health, now: float) -> None:
         """Take note of a health message received at `now` [s]."""
         with self._lock:
-            if health.source in self._health or len(self._health) < MOST_SOURCES:
+            if is_remembered(self._health, health.source):
                 self._health[health.source] = health, now
 
     def collect(self) -> Iterator["Metric"]:

@@ -1,6 +1,9 @@
 """The router of a rig with keys follows the register, and counts what it refuses."""
 
+import os
 import shutil
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -18,7 +21,7 @@ from rigwatch.wire.messages import ALARMS, COMMANDS, EVENTS, HEALTH, AlarmComman
 from rigwatch.wire.rig_config import load_rig
 from tests.access.secured_rig import SecuredRig, make_keys
 from tests.bus.test_complete_subscription import alarm
-from tests.waiting import eventually
+from tests.waiting import PATIENCE, eventually
 
 
 @pytest.fixture
@@ -131,6 +134,39 @@ def test_the_log_of_refusals_passes_everything_else_on() -> None:
     assert (log.connections, log.messages) == (1, 1)
     passed = log.take(b"y" * 70_000)
     assert len(passed) == 70_001
+
+
+REFUSALS = f"""
+import os, sys, time
+from rigwatch.router import RefusalLog
+log = RefusalLog()
+log.open()
+os.write(1, b"something else\\n" * 20_000)
+for _ in range(100):
+    os.write(1, b"x {DENIED_MARK.decode()}\\n" * 1000)
+while log.messages < 100_000:
+    time.sleep(0.01)
+log.close()
+"""
+
+
+@pytest.mark.parametrize("output", ["stalled", "closed", "full"])
+def test_refusals_are_counted_and_the_router_goes_on_whatever_becomes_of_the_output(
+    output: str,
+) -> None:
+    reading, writing = os.pipe()
+    if output == "closed":
+        os.close(reading)
+    if output == "full":
+        os.close(writing)
+        writing = os.open("/dev/full", os.O_WRONLY)
+    command = [sys.executable, "-c", REFUSALS]
+    with subprocess.Popen(command, stdout=writing, stderr=subprocess.DEVNULL) as log:
+        os.close(writing)
+        try:
+            assert log.wait(PATIENCE) == 0
+        finally:
+            log.kill()
 
 
 @pytest.mark.parametrize(

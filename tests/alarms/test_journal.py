@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -14,6 +15,7 @@ import pytest
 
 from monitor.alarms import AlarmJournal, AlarmManager, read_journal
 from rigwatch.wire.errors import SessionError
+from rigwatch.wire.messages import Alarm, decode, encode
 from tests.alarms.alarm_signals import condition, newest, order, run, spell
 
 ROOT = Path(__file__).parents[2]
@@ -115,6 +117,31 @@ def test_garbage_lines_are_counted_and_skipped(tmp_path):
     assert (repr(records), unreadable) == (repr(changes), len(garbage))
 
 
+@pytest.mark.parametrize(
+    ("written", "damaged"),
+    [
+        (b'"t_ns": 1', b'"t_ns": 9'),  # one bit of a time of nineteen digits
+        (b'"seq": ', b'"seq": -99999999999999999999'),
+        (b'"unacknowledged"', b'"unacknowlddged"'),
+        (b'"severity": "error"', b'"severity": "errnr"'),
+    ],
+)
+def test_a_record_that_cannot_be_told_counts_as_unreadable(tmp_path, written, damaged):
+    path = tmp_path / "alarms.jsonl"
+    journal = AlarmJournal(path)
+    journal.write(faulty_manager().take_changes())
+    journal.close()
+    text = re.sub(rb'"t_ns": \d+', b'"t_ns": 1767225600000000000', path.read_bytes())
+    assert written in text
+    path.write_bytes(text.replace(written, damaged))
+    records, unread = read_journal(path)
+    assert unread > 0
+    for record in records:
+        assert decode(Alarm, encode(record.alarm)) is not None
+    for alarm in restarted(path).standing():
+        assert encode(alarm)
+
+
 def test_no_journal_yet_is_no_error(tmp_path):
     assert read_journal(tmp_path / "none.jsonl") == ([], 0)
 
@@ -213,6 +240,38 @@ def test_a_journal_that_has_grown_is_rotated_and_keeps_the_state_of_every_alarm(
     reopened = AlarmJournal(path)
     assert {one.alarm.name for one in reopened.newest()} == {one.alarm.name for one in changes}
     reopened.close()
+
+
+def test_a_journal_is_rotated_where_the_file_system_has_no_links(tmp_path, monkeypatch):
+    def refused(*_: object, **__: object) -> None:
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(os, "link", refused)  # as on a memory card
+    test_a_journal_that_has_grown_is_rotated_and_keeps_the_state_of_every_alarm(tmp_path)
+
+
+def test_no_older_journal_is_lost_while_rotating_fails(tmp_path, monkeypatch):
+    path = tmp_path / "alarms.jsonl"
+    journal = AlarmJournal(path, largest=20_000)
+    changes = faulty_manager().take_changes()
+    while not (tmp_path / "alarms.jsonl.8").exists():
+        journal.write(changes)
+    older = {file.name: file.read_bytes() for file in tmp_path.glob("alarms.jsonl.?")}
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "link", full)
+        patched.setattr(shutil, "copyfile", full)
+        for _ in range(20):
+            journal.write(changes)
+        assert "no space left on the disk" in journal.failure
+    kept = {file.name: file.read_bytes() for file in tmp_path.glob("alarms.jsonl.?")}
+    assert kept == older
+    journal.write(changes)
+    assert journal.failure == ""
+    journal.close()
 
 
 @pytest.mark.parametrize("replaced", [False, True])

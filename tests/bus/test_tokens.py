@@ -1,10 +1,14 @@
 """Tokens with names: few keys over any number of starts, and the name known to all."""
 
+import pytest
+
 from rigwatch.wire.bus import unique_process
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.bus.tokens import SLOTS
-from rigwatch.wire.messages import ALARMS, GAPS, encode
-from rigwatch.wire.ordering import Numbered
+from rigwatch.wire.delivery import SampleReader, SampleRing
+from rigwatch.wire.messages import ALARMS, GAPS, SAMPLES, encode
+from rigwatch.wire.ordering import Numbered, RingReply
+from tests.bus.samples import block
 from tests.bus.test_complete_subscription import alarm, heard, say
 from tests.waiting import PATIENCE, eventually
 
@@ -120,3 +124,69 @@ def test_messages_whose_sender_ends_before_its_name_is_known_are_a_gap():
         0,
         -1,
     )
+
+
+HUGE = [f"{10**30}/0", f"{2**63}/0", f"{-(2**63) - 1}/0"]
+"""Numbers that no run or boot has, nor a question to a ring: 64 bits."""
+
+
+@pytest.mark.parametrize("name", HUGE)
+@pytest.mark.parametrize("process", ["monitor", "stranger"])
+def test_a_name_with_a_number_beyond_64_bits_ends_no_listener(name: str, process: str):
+    network = MemoryNetwork()
+    monitor, stranger = network.bus("r", "monitor"), network.bus("r", "stranger")
+    say(monitor, range(1))
+    early = network.bus("r", "early").listen(ALARMS)
+    stranger.named_token(f"said/{process}").declare(name)
+    late = network.bus("r", "late").listen(ALARMS)
+    network.up = False
+    say(monitor, range(1, 5))
+    network.up = True
+    for listener in (early, late):
+        assert heard(listener, until=4) == [1, 2, 3, 4]  # what was lost is still asked for
+        listener.close()
+
+
+@pytest.mark.parametrize("name", HUGE)
+def test_a_source_with_a_number_beyond_64_bits_ends_no_reader(name: str):
+    network = MemoryNetwork()
+    daq, stranger = network.bus("r", "daq"), network.bus("r", "stranger")
+    ring = SampleRing(daq, 4096)
+    reader = SampleReader(network.bus("r", "reader"))
+    stranger.named_token("source").declare(name)
+    for part in (block(0, 4), block(4, 4), block(8, 4)):
+        ring.add(part)
+        if part.seq != 4:
+            daq.publish(SAMPLES, part)
+    eventually(lambda: reader.read(0.05) is not None and reader.position == (7, 11), "all samples")
+    reader.close()
+
+
+def test_a_ring_that_tells_a_number_beyond_all_messages_ends_no_listener():
+    network = MemoryNetwork()
+    monitor, stranger = network.bus("r", "monitor"), network.bus("r", "stranger")
+    say(monitor, range(1))
+    run = monitor._numbered().run
+    reply = RingReply(run, 2**63 - 1, ()).to_bytes()
+    end = stranger.serve("ring/monitor/alarms", lambda _: [reply])
+    listener = network.bus("r", "listener").listen(ALARMS)
+    end()
+    say(monitor, range(1, 5))
+    assert heard(listener, until=4) == [1, 2, 3, 4]
+    listener.close()
+
+
+def test_a_process_that_calls_the_run_of_another_its_own_silences_nobody():
+    network = MemoryNetwork()
+    monitor, stranger = network.bus("r", "monitor"), network.bus("r", "stranger")
+    say(monitor, range(1))
+    listener = network.bus("r", "listener").listen(ALARMS)
+    token = stranger.named_token("said/stranger")
+    token.declare(f"{monitor._numbered().run}/0")
+    say(monitor, range(1, 3))
+    assert [message.seq for message in listener.drain()] == [1, 2]
+    token.close()
+    say(monitor, range(3, 5))
+    assert [message.seq for message in listener.drain()] == [3, 4]
+    assert listener.foreign == 0
+    listener.close()

@@ -1,19 +1,22 @@
 """What is drawn: every column once, ranges that stand still, batches that lose nothing."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+import rerun as rr
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigwatch.dashboard.board import quantities
+from rigwatch.dashboard.board import Dashboard, Facts, quantities
 from rigwatch.dashboard.board.batches import Batches
 from rigwatch.dashboard.board.entities import HEALTH_VIEWS
 from rigwatch.dashboard.board.health import counters, view_of
 from rigwatch.dashboard.board.quantities import ESTIMATE_PLOTS, SAMPLE_PLOTS, plots_of
 from rigwatch.dashboard.board.ranges import around_signature, nice_above, peak, symmetric
 from rigwatch.dashboard.board.survey import Survey
+from rigwatch.wire.messages import MOST_FIGURES, MOST_SOURCES, Health
 from rigwatch.wire.messages.message_types import Column, EstimateBlock, SampleBlock
 from tests.dashboard.rig_messages import MARKS, Rig
 
@@ -127,3 +130,17 @@ def test_every_counter_is_drawn() -> None:
     assert {name for _, name, _ in counters(RIG.health(0))} == {
         f"daq {name}" for name in RIG.health(0).counters
     }
+
+
+def test_processes_and_figures_that_are_made_up_stay_bounded(tmp_path: Path) -> None:
+    stream = rr.RecordingStream("rigwatch", make_default=False)
+    stream.save(tmp_path / "screen.rrd")
+    board = Dashboard(stream, Facts("bench"))
+    board.show(Health("monitor", 1, "running", "", {"lost_samples": 0.0}))
+    for number in range(3 * MOST_SOURCES):
+        figures = {f"figure_{number}_{i}": 0.0 for i in range(2 * MOST_FIGURES)}
+        board.show(Health(f"p{number}", 1, "running", "", figures))
+    board.show(Health("monitor", 2, "stale", "", {"lost_samples": 1.0}))
+    assert len(board.facts.health) == MOST_SOURCES
+    assert board.facts.health["monitor"].state == "stale"
+    assert len(board._counters) == MOST_SOURCES * MOST_FIGURES

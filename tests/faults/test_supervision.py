@@ -1,20 +1,26 @@
 """`rigwatch up` under what its surroundings do: output, configuration, children out of hand."""
 
+import errno
 import fcntl
 import os
 import signal
 import subprocess
 import sys
 import termios
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from rigwatch.demo.rig_file import write_rig_file
+from rigwatch.supervisor import RigSet, Supervisor
 from rigwatch.supervisor.child import LONGEST_LINE
+from rigwatch.supervisor.rig_set import GONE_AFTER
 from rigwatch.supervisor.settled_file import SettledFile
+from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.typed_files.shipped import find_config
+from tests.monitor_process.test_several import rig_file
 from tests.tooling.test_supervisor import WORKER, of_kind, supervise, worker
 from tests.tooling.test_up import WITHOUT, Rig, on_a_port_of_its_own
 from tests.waiting import eventually
@@ -150,6 +156,7 @@ def test_an_endless_line_takes_no_memory_and_hides_no_later_line() -> None:
 AWAY = "import os, time; os.setresuid(*[65534] * 3); print('away', flush=True); time.sleep(600)"
 SUPERVISED = """
 import sys
+from tests.monitor_process.test_several import rig_file
 from tests.tooling.test_supervisor import *
 away = ProcessPlan("away", (sys.executable, "-c", sys.argv[1]))
 limits = Limits(start=1.0, stop=5.0, first_pause=0.1, longest_pause=0.5)
@@ -182,3 +189,26 @@ def test_a_child_that_cannot_be_killed_delays_nothing_and_is_not_started_beside_
     (pid,) = map(int, started.split())
     os.kill(pid, signal.SIGKILL)
     assert last == "stopped"
+
+
+def test_a_folder_of_configurations_that_does_not_answer_ends_no_rig(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    paths = [rig_file(tmp_path, name) for name in ("a", "b")]
+    rigs = [(path, load_rig(path)) for path in paths]
+    supervisor, told = Supervisor([], lambda _: None), list[str]()
+    rig_set = RigSet(paths, rigs, (), supervisor, told.append)
+    stat, began = Path.stat, time.monotonic()
+
+    def stale(path: Path, **options: bool) -> os.stat_result:
+        if path in paths:
+            raise OSError(errno.ESTALE, os.strerror(errno.ESTALE))
+        return stat(path, **options)
+
+    monkeypatch.setattr(Path, "stat", stale)
+    for seconds in (1.0, 2.0 + GONE_AFTER):
+        monkeypatch.setattr(time, "monotonic", lambda now=began + seconds: now)
+        rig_set.check()
+    assert told == []
+    assert list(rig_set._rigs) == paths
+    supervisor._stop_all()

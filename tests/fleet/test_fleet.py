@@ -7,10 +7,12 @@ import pytest
 
 from rigwatch.commands import main
 from rigwatch.fleet import Fleet, as_lines, as_page
+from rigwatch.fleet.fleet import Onlooker
 from rigwatch.fleet.rig_state import GONE, UNREACHABLE, judged
 from rigwatch.wire.bus import Bus, connect
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.errors import ConfigError
-from rigwatch.wire.messages import Alarm, Health
+from rigwatch.wire.messages import HEALTH, MOST_SOURCES, Alarm, Health
 from rigwatch.wire.rig_config import load_rig
 from tests.bus.rig import TestRig, kill, stopped
 from tests.monitor_process.test_several import rig_file
@@ -51,6 +53,32 @@ def test_a_page_has_a_section_for_each_rig_and_escapes_what_rigs_say():
     assert 'id="rig-a%20b"' in page
     assert "&lt;rubs&gt; stop &amp; look" in page
     assert "rigwatch dashboard &#39;my rig.toml&#39;" in page
+
+
+def test_processes_that_are_made_up_are_bounded_and_those_of_the_rig_are_heard(tmp_path: Path):
+    network = MemoryNetwork()
+    bus, stranger = network.bus("r", "fleet"), network.bus("r", "stranger")
+    onlooker = Onlooker(tmp_path, load_rig(TestRig(tmp_path).path), 0.1)
+    onlooker._bus, onlooker._healths = bus, bus.subscribe(HEALTH)
+    for number in range(3 * MOST_SOURCES):
+        stranger.publish(HEALTH, Health(f"p{number}", 1, "running", "", {}))
+    onlooker.state()
+    daq = network.bus("r", "daq")  # it begins late
+    daq.publish(HEALTH, Health("daq/rig", 1, "reconnecting", "", {}))
+    assert onlooker.state().state == "daq/rig: reconnecting"
+    assert len(onlooker._last) == MOST_SOURCES + 1
+
+
+def test_a_rig_whose_keys_cannot_be_read_hides_no_other(tmp_path: Path):
+    paths = [rig_file(tmp_path, "plain"), rig_file(tmp_path, "keyed")]
+    text = paths[1].read_text().replace("tcp/", "tls/")
+    paths[1].write_text(f'{text}\n[bus.security]\nkeys = "{tmp_path}/none"\n')
+    fleet = Fleet(paths, timeout=0.2)
+    states = {state.rig: state for state in fleet.states()}
+    fleet.close()
+    assert "no router answers" in states["plain"].state
+    assert states["keyed"].rank == UNREACHABLE
+    assert "no such file; `rigwatch keys issue" in states["keyed"].state
 
 
 @pytest.fixture

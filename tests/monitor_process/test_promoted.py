@@ -6,10 +6,16 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from monitor.model.model_file import PromotedSection, load_model
+from monitor.model.model_file import PromotedSection, ReferenceSection, load_model, model_text
 from monitor.pipeline.promoted import PromotedFriction
 from monitor.signals.admission import GOOD, RESTART
 from monitor.signals.residual import MODELLED, VELOCITY
+from rigwatch.wire.bus import ModelRequest, ask_for_model
+from rigwatch.wire.errors import ModelError
+from rigwatch.wire.messages import MODELS
+from tests.monitor_process.model import MODEL as OF_BENCH
+from tests.monitor_process.test_process import Bench
+from tests.monitor_process.test_strangers import asked
 
 MODEL = load_model(Path(__file__).parents[1] / "verify" / "model.toml")
 KNOWN = structs.replace(MODEL, promoted=PromotedSection(coulomb=0.4, smooth=0.02))
@@ -49,3 +55,40 @@ def test_without_anything_promoted_nothing_is_added() -> None:
     columns = moving()
     PromotedFriction(MODEL).add(columns, np.full(len(columns), GOOD))
     assert not columns[:, MODELLED].any()
+
+
+def with_references(count: int, period: int) -> str:
+    """A model file with the healthy motion under several slow drives, `period` samples long."""
+    column = tuple(np.random.default_rng(1).normal(size=period).tolist())
+    columns = dict.fromkeys(("voltage", "position", "acceleration", "modelled"), column)
+    one = ReferenceSection(periods=10, scale=1.0, **columns)
+    return model_text(structs.replace(OF_BENCH, reference=(one,) * count))
+
+
+def test_a_model_of_slow_drives_is_promoted_and_told(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    told = bench.observer.subscribe(MODELS)
+    large = with_references(3, 512)  # three drives of half a hertz
+    for _ in range(2):
+        reply = asked(bench, ModelRequest("promote", large, "ann", "a better one"))
+        assert reply.done, reply.text
+    first, second = told.drain()
+    assert first.previous == model_text(OF_BENCH)
+    assert (first.model, second.model) == (large, large)
+    bench.monitor.close()
+
+
+def test_a_model_that_cannot_be_told_is_refused_before_anything_changes(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    too_large, path = with_references(4, 960), tmp_path / "model.toml"
+    with pytest.raises(ModelError, match="expected at most 262144"):
+        ask_for_model(bench.observer, ModelRequest("promote", too_large, "ann", ""))
+    bench.monitor.close()
+    path.write_text(too_large)
+    bench.start()
+    assert asked(bench, ModelRequest("promote", model_text(OF_BENCH), "ann", "")).done
+    reply = asked(bench, ModelRequest("rollback", "", "ann", ""))
+    assert not reply.done
+    assert f"{len(too_large)} characters, more than can be told" in reply.text
+    assert path.read_text() == model_text(OF_BENCH)
+    bench.monitor.close()

@@ -24,6 +24,7 @@ from rigwatch.wire.messages import (
 )
 from rigwatch.wire.messages.protobuf_schema import file_descriptor_set, type_name
 from rigwatch.wire.session import LARGEST_BLOCK, SessionWriter, open_session, run_info
+from rigwatch.wire.session.chunks import LARGEST_CHUNK
 from rigwatch.wire.session.merging import merge_pending
 from rigwatch.wire.session.writer import SPILL, message_time
 from tests.recorder.full_disk import largest_file
@@ -331,3 +332,18 @@ def test_the_reason_of_a_failing_disk_is_reported(
         writer.flush()
     writer.abandon()
     assert str(told.value) == f"{path}: cannot be written: {reason}"
+
+
+def test_a_flood_of_long_texts_costs_nothing_of_what_is_beside_it(tmp_path: Path) -> None:
+    path, count = tmp_path / "flood.mcap", LARGEST_CHUNK // 250_000 + 10
+    flood = [Event("eve", i, "info", "X", "x" * 250_000) for i in range(count)]
+    with SessionWriter(path, RUN) as writer:
+        writer.write(samples(0, 100))
+        for one in flood:
+            writer.write(one)
+        writer.write(samples(100, 100))
+        writer.flush()
+    session = open_session(path)
+    assert [(one.seq, len(one)) for one in session.samples()] == [(0, 200)]
+    kept = [one.message.t_ns for one in session.messages(["events"])]
+    assert kept == [*range(count)]

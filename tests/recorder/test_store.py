@@ -101,6 +101,18 @@ def test_what_memory_cannot_hold_is_dropped_and_counted(tmp_path: Path) -> None:
     assert store.samples == len(seqs)
 
 
+def test_long_texts_weigh_what_they_are(tmp_path: Path) -> None:
+    ram = 1 << 20
+    store = Store(tmp_path / "s", RUN, segment=3600.0, ram_bytes=ram)
+    with largest_file(0):
+        for turn in range(100):
+            store.add(Event("eve", turn, "info", "X", "x" * 100_000))
+            store.add(Health("eve", turn, "y" * 100_000, "", {}))
+            store.flush(turn * 1.0, turn)
+    assert sum(len(getattr(one, "text", "")) for one in store._waiting) <= ram
+    assert store.dropped_messages > 150
+
+
 def test_a_folder_that_cannot_be_made_is_tried_again(tmp_path: Path) -> None:
     (tmp_path / "s").write_text("in the way")
     store = Store(tmp_path / "s" / "run", RUN, segment=3600.0)

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from rigwatch.wire.host.heartbeat import INTERVAL, Heartbeat
+from rigwatch.supervisor import OwnHeartbeat, ProcessPlan, Supervisor
+from rigwatch.supervisor.own_heartbeat import PATIENCE
+from rigwatch.wire.host.heartbeat import INTERVAL, NO_ROUTER, WAITS, WAITS_AFTER, Heartbeat
 
 
 @pytest.fixture
@@ -100,3 +102,78 @@ def test_a_full_socket_does_not_block(supervisor: socket.socket) -> None:
         beat.advance(count)
         clock.now += INTERVAL
     assert said(supervisor)
+
+
+def test_what_a_late_supervisor_could_not_take_is_said_again(supervisor: socket.socket) -> None:
+    clock = Clock()
+    beat = heartbeat(supervisor, clock)
+    for turn in range(10_000):  # nobody reads: the socket takes no more
+        beat.advance(turn + 1)
+        clock.now += INTERVAL
+    clock.now += WAITS_AFTER
+    beat.advance(10_000, "the device is not open")
+    said(supervisor)
+    clock.now += INTERVAL
+    beat.advance(10_000, "the device is not open")
+    assert f"STATUS={WAITS}the device is not open" in said(supervisor)[0]
+
+
+def ready(supervisor: Supervisor, name: str) -> None:
+    """What a process of this name reports that runs."""
+    watched = supervisor.processes[name]
+    watched.start_at, watched.was_ready = None, True
+    watched.vitals.take("READY=1\nSTATUS=running", 0.0)
+
+
+def supervised(*names: str) -> Supervisor:
+    """Processes that have not been started."""
+    made = Supervisor([ProcessPlan(name, ("false",)) for name in names], lambda _: None)
+    for watched in made.processes.values():
+        watched.start_at = 0.0
+    return made
+
+
+def test_a_process_that_does_not_get_ready_does_not_make_the_parent_start_all_anew(
+    supervisor: socket.socket,
+) -> None:
+    clock, processes = Clock(), supervised("daq", "monitor")
+    own = OwnHeartbeat(processes, heartbeat(supervisor, clock), clock)
+    ready(processes, "daq")
+    own.turn(0)
+    clock.now = PATIENCE - 1.0
+    own.turn(1)
+    assert "READY" not in "".join(said(supervisor))
+    clock.now = PATIENCE
+    own.turn(2)
+    assert said(supervisor)[0].startswith("READY=1\nSTATUS=all but monitor run")
+    own.turn(3)
+    assert "READY" not in "".join(said(supervisor))
+    processes._stop_all()
+
+
+@pytest.mark.parametrize(
+    ("status", "told"),
+    [
+        (f"{WAITS}no device matches", "no device matches"),
+        (f"{WAITS}{NO_ROUTER}", NO_ROUTER),
+        ("running", ""),
+        (None, "daq is down"),
+        ("absent", "samples come from elsewhere"),
+    ],
+)
+def test_the_parent_is_told_why_no_samples_come(
+    status: str | None, told: str, supervisor: socket.socket
+) -> None:
+    clock, processes = Clock(), supervised("daq" if status != "absent" else "recorder")
+    own = OwnHeartbeat(processes, heartbeat(supervisor, clock), clock)
+    if status not in (None, "absent"):
+        ready(processes, "daq")
+        processes.processes["daq"].vitals.take(f"STATUS={status}", 0.0)
+    own.turn(5)
+    clock.now = WAITS_AFTER
+    said(supervisor)
+    own.turn(5)
+    (word,) = said(supervisor)
+    assert ("WATCHDOG=1" in word) == bool(told)
+    assert (f"STATUS={WAITS}{told}" in word) == bool(told)
+    processes._stop_all()

@@ -18,7 +18,7 @@ from rigwatch.supervisor.plan import ProcessPlan
 from rigwatch.supervisor.supervisor import ProcessEvent, Supervisor, how_it_ended
 from rigwatch.supervisor.vitals import Limits, Vitals
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.wire.host import NO_ROUTER, WAITS, waits_of
+from rigwatch.wire.host import NO_ROUTER, NO_SAMPLES, WAITS, waits_of
 
 LIMITS = Limits(start=20, silence=1.0, stall=1.5, stop=2, first_pause=0.1, settled=3)
 
@@ -123,6 +123,31 @@ def test_pauses_grow_and_the_reason_is_the_last_line_that_was_printed() -> None:
     assert ended.text == "ended with code 2: model.toml: no such file"
 
 
+def test_a_process_that_cannot_be_started_ends_no_other_and_is_tried_again(tmp_path: Path) -> None:
+    program, away = tmp_path / "daq", tmp_path / "being replaced"
+    program.write_text(f"#!{sys.executable}\n{WORKER.format(step=1)}")
+    program.chmod(0o755)
+    open_files: list[int] = []
+
+    def script(supervisor: Supervisor, events: list[ProcessEvent]) -> bool:
+        if program.exists() and all_ready(supervisor) and not of_kind(events, "daq", "ended"):
+            program.rename(away)  # as while a package is being updated
+            os.kill(supervisor.processes["daq"].child.pid, signal.SIGKILL)
+        if away.exists() and len(of_kind(events, "daq", "ill")) >= 1:
+            open_files.append(len(list(Path("/proc/self/fd").iterdir())))
+            if len(of_kind(events, "daq", "ill")) == 3:
+                away.rename(program)
+        return len(of_kind(events, "daq", "ready")) == 2
+
+    events = supervise([ProcessPlan("daq", (str(program),)), worker("monitor")], script)
+    ill = [event.text for event in of_kind(events, "daq", "ill")]
+    assert ill == ["cannot be started: no such file or directory"] * 3
+    pauses = [event.text for event in of_kind(events, "daq", "restarting")]
+    assert pauses == [f"starts again in {pause} s" for pause in (0.1, 0.2, 0.4, 0.8)]
+    assert len(of_kind(events, "monitor", "started")) == 1
+    assert max(open_files) == open_files[0]
+
+
 def test_a_simulated_device_is_started_once_those_who_watch_it_are_ready() -> None:
     slow = "import time; time.sleep(1)\n" + WORKER.format(step=1)
     plant = ProcessPlan("plant", worker("plant").arguments, after=("monitor", "not here"))
@@ -217,6 +242,16 @@ def test_a_process_that_says_its_device_is_gone_is_not_started_again_for_having_
         source.take(f"X_RIGWATCH_COUNT={now * 256:.0f}", now=now)
         daq.take("STATUS=running\nX_RIGWATCH_COUNT=5", now=now)
         assert bool(daq.complaint(source, now, LIMITS)) == (now > seconds[-1] + LIMITS.stall)
+
+
+def test_a_daq_that_gets_nothing_of_a_simulated_device_that_has_samples_is_started_again() -> None:
+    source, daq = Vitals(0.0), Vitals(0.0, reads_device=True)
+    for vitals in (source, daq):
+        vitals.take("READY=1\nX_RIGWATCH_COUNT=5", now=1.0)
+    for turn in range(8, 16):
+        source.take(f"X_RIGWATCH_COUNT={turn * 64}", now=0.25 * turn)
+        daq.take(f"STATUS={WAITS}{NO_SAMPLES}\nX_RIGWATCH_COUNT=5", now=0.25 * turn)
+    assert "takes no samples" in daq.complaint(source, 0.25 * 15, LIMITS)
 
 
 def test_a_process_that_waits_for_its_router_is_not_started_again_for_having_no_samples() -> None:

@@ -17,14 +17,21 @@ import pytest
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.errors import ConfigError, RigwatchError
 from rigwatch.wire.host import free_port
-from rigwatch.wire.messages import ALARMS, ESTIMATES, HEALTH, EstimateBlock, Health
+from rigwatch.wire.messages import (
+    ALARMS,
+    ESTIMATES,
+    HEALTH,
+    MOST_SOURCES,
+    EstimateBlock,
+    Health,
+)
 from rigwatch.wire.rig_config import SecuritySection, WitnessSection
 from rigwatch.witness import beats
 from rigwatch.witness.addresses.bounded import MOST_HUNG
 from rigwatch.witness.addresses.connections import Connections
 from rigwatch.witness.addresses.http_ping import why_not
 from rigwatch.witness.beats import Pinger
-from rigwatch.witness.metrics import MOST_SOURCES, Endpoint, Figures
+from rigwatch.witness.metrics import Endpoint, Figures
 from rigwatch.witness.process import Witness
 from tests.access.secured_rig import make_keys
 from tests.waiting import eventually

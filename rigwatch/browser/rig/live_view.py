@@ -15,6 +15,7 @@ from rigwatch.wire.messages import (
     Health,
     SampleBlock,
     columns_of,
+    is_remembered,
     json_fields,
     remember,
 )
@@ -77,7 +78,7 @@ class LiveView:
             self._keep(message, now)
         elif isinstance(message, Alarm):
             remember(self._alarms, message)
-        elif isinstance(message, Health):
+        elif isinstance(message, Health) and is_remembered(self._health, message.source):
             self._health[message.source] = message, now
 
     def _keep(self, block: SampleBlock | EstimateBlock, now: float) -> None:

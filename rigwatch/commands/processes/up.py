@@ -6,9 +6,17 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rigwatch.commands.common import POSITIVE, file_or_name
-from rigwatch.supervisor import PROCESSES, Console, Flow, RigSet, Supervisor, planned
+from rigwatch.supervisor import (
+    PROCESSES,
+    Console,
+    Flow,
+    OwnHeartbeat,
+    RigSet,
+    Supervisor,
+    planned,
+)
 from rigwatch.wire.errors import BusError
-from rigwatch.wire.host import Heartbeat, endpoint_address, is_free
+from rigwatch.wire.host import endpoint_address, is_free
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.several_rigs import Rigs, valid_rigs
 
@@ -53,21 +61,15 @@ def run(arguments: argparse.Namespace) -> int:
     supervisor.stop_on_signals()
     if len(paths) > 1 and "dashboard" not in without and any(one.dashboard for _, one in rigs):
         console.remark(NO_DASHBOARD)
-    flow, heartbeat = Flow(supervisor), Heartbeat("up")
+    flow, heartbeat = Flow(supervisor), OwnHeartbeat(supervisor)
     rig_set = RigSet(paths, rigs, without, supervisor, console.changed)
     stop_at = time.monotonic() + arguments.seconds
-    is_ready = False
 
     def each_turn() -> None:
-        nonlocal is_ready
         flow.update()
         rig_set.check()
         console.status(supervisor, flow)
-        if not is_ready and all(w.was_ready for w in supervisor.processes.values()):
-            is_ready = True
-            heartbeat.ready("all processes run")
-        # The parent of this supervisor gets the same notification: samples advance.
-        heartbeat.advance(flow.totals.get("daq", 0))
+        heartbeat.turn(flow.totals.get("daq", 0))
         if time.monotonic() >= stop_at:
             supervisor.stop()
 

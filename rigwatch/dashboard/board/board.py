@@ -21,6 +21,8 @@ from rigwatch.dashboard.board.status import advice, status
 from rigwatch.dashboard.board.survey import PlotPlan, Survey
 from rigwatch.wire.arrays import IntArray
 from rigwatch.wire.messages import (
+    MOST_FIGURES,
+    MOST_SOURCES,
     Alarm,
     Column,
     EstimateBlock,
@@ -30,6 +32,7 @@ from rigwatch.wire.messages import (
     Message,
     RunInfo,
     SampleBlock,
+    is_remembered,
 )
 
 APPLICATION = "rigwatch"
@@ -131,10 +134,14 @@ class Dashboard:
         self._keep_up(changed=True)
 
     def _health(self, health: Health) -> None:
+        if not is_remembered(self.facts.health, health.source):
+            return
         self.facts.health[health.source] = health
         self._at(health.t_ns)
         for view, name, value in counters(health):
             if (view, name) not in self._counters:
+                if len(self._counters) >= MOST_SOURCES * MOST_FIGURES:
+                    continue
                 self._add_counter(view, name)
             self._stream.log(entity(view, name), rr.Scalars(value))
 

@@ -44,9 +44,10 @@ from rigwatch.wire.bus.connection import (
 from rigwatch.wire.bus.inbox import Inbox
 from rigwatch.wire.bus.kept_messages import KeptMessages, kept_runs
 from rigwatch.wire.bus.member import unique_process
-from rigwatch.wire.bus.message_ring import SAID_KEY
+from rigwatch.wire.bus.message_ring import LARGEST_NUMBERED, SAID_KEY
 from rigwatch.wire.bus.ring_questions import RingQuestions
 from rigwatch.wire.bus.subscription import MOST_COMMANDS, QUEUE_CAPACITY, Subscription
+from rigwatch.wire.bus.tokens import sender_named
 from rigwatch.wire.bus.transport import DENIED_MARK, MAX_PAYLOAD, REFUSED_MARK, Close
 
 __all__ = [
@@ -54,6 +55,7 @@ __all__ = [
     "DEVICE_KEY",
     "DEVICE_RUN_KEY",
     "KEY",
+    "LARGEST_NUMBERED",
     "MAX_PAYLOAD",
     "MOST_COMMANDS",
     "PATIENCE",
@@ -91,6 +93,7 @@ __all__ = [
     "marked",
     "open_router",
     "proved_here",
+    "sender_named",
     "serve_alarm_list",
     "serve_shelf",
     "shelf_line",

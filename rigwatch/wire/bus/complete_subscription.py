@@ -24,7 +24,7 @@ from rigwatch.wire.bus.message_ring import SAID_KEY, ring_key
 from rigwatch.wire.bus.ring_questions import REPLY_TIMEOUT, RingQuestions
 from rigwatch.wire.bus.sender import Sender
 from rigwatch.wire.bus.subscription import QUEUE_CAPACITY, Subscription
-from rigwatch.wire.bus.tokens import EarlyMessages
+from rigwatch.wire.bus.tokens import EarlyMessages, sender_named
 from rigwatch.wire.bus.transport import MAX_PAYLOAD
 from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import ALARMS, EVENTS, GAPS, Event, Gap, Topic, decode, decode_all
@@ -75,8 +75,8 @@ class CompleteSubscription(Subscription):
         self._bus, self._patient = bus, patient
         self._gaps_in_place, self._publish_gaps = gaps_in_place, publish_gaps
         self._senders: dict[str, Sender] = {}
-        self._runs: dict[int, str] = {}
-        self._ended: dict[int, float] = {}
+        self._runs: dict[int, list[str]] = {}
+        self._ended: dict[tuple[int, str], float] = {}
         self._assumed: dict[str, int] = {}
         self._unconfirmed: dict[str, list[Token]] = {}
         self._early = EarlyMessages()
@@ -280,21 +280,29 @@ class CompleteSubscription(Subscription):
             return
         peer = self._senders[process]
         if alive:
-            self._runs[run] = process
-            self._ended.pop(run, None)
+            self._begin_run(run, process)
             self._handle(process, peer.appeared(run, since_ns, sender))
         else:
-            self._end_run(run)
+            self._end_run(run, process)
             self._handle(process, peer.vanished(run, since_ns))
 
-    def _end_run(self, run: int) -> None:
+    def _begin_run(self, run: int, process: str) -> None:
+        """Note that a process calls a run its own; others may do so too, as runs are no secret."""
+        self._ended.pop((run, process), None)
+        if process not in (names := self._runs.setdefault(run, [])):
+            names.append(process)
+
+    def _end_run(self, run: int, process: str) -> None:
         """Note the end of a run, and forget those that ended long ago."""
         now = time.monotonic()
-        self._ended.pop(run, None)
-        self._ended[run] = now
-        for gone in [one for one, at in self._ended.items() if now - at >= RUN_KEPT]:
-            del self._ended[gone]
-            self._runs.pop(gone, None)
+        if process in self._runs.get(run, ()):
+            self._ended.pop((run, process), None)
+            self._ended[run, process] = now
+        for gone, of in [one for one, at in self._ended.items() if now - at >= RUN_KEPT]:
+            del self._ended[gone, of]
+            self._runs[gone].remove(of)
+            if not self._runs[gone]:
+                del self._runs[gone]
 
     def _follow_new(self, token: "Token") -> bool:
         """Follow a process whose token was not seen at the start; an older run from now on."""
@@ -322,25 +330,27 @@ class CompleteSubscription(Subscription):
         self._take_numbered(message, sender)
 
     def _take_numbered(self, message: Numbered, sender: str) -> None:
-        process = self._runs.get(message.boot, "")
-        if not process and self._early.keep(message, sender):
+        names = self._runs.get(message.boot, ())
+        if not names and self._early.keep(message, sender):
             return
-        peer = self._senders.get(process)
-        outcomes = peer.received(message, sender) if peer else None
-        if outcomes is not None:
-            self._handle(process, outcomes)
-        elif not process and self._early.ended:
+        for process in names:
+            peer = self._senders.get(process)
+            outcomes = peer.received(message, sender) if peer else None
+            if outcomes is not None:
+                self._handle(process, outcomes)
+                return
+        if not names and self._early.ended:
             self._miss_unknown(message)
         else:
             self.foreign += 1
 
     def _miss_unknown(self, message: Numbered) -> None:
         """A process has ended before its name was known, perhaps the one that sent the message."""
-        first = message.seq
+        first, process = message.seq, self._early.ended
         reason = "the process ended before it could say who it was"
-        self._runs[message.boot] = self._early.ended
-        self._end_run(message.boot)
-        self._miss(self._early.ended, Loss(message.boot, first, first - 1, reason))
+        self._begin_run(message.boot, process)
+        self._end_run(message.boot, process)
+        self._miss(process, Loss(message.boot, first, first - 1, reason))
 
     def _look_for_more(self) -> None:
         now = time.monotonic()
@@ -396,11 +406,8 @@ Token = tuple[str, int, int, str]
 
 def _parsed(place: str, name: str | None) -> tuple[str, Token | None]:
     """Process, and its token with run, start time and identity; None if it is not of this form."""
-    process = place.rpartition("/")[2]
-    with contextlib.suppress(ValueError):
-        run, since_ns, sender = (name or "").split("/")
-        return process, (process, int(run), int(since_ns), sender)
-    return process, None
+    process, named = place.rpartition("/")[2], sender_named(name)
+    return process, None if named is None else (process, *named)
 
 
 def _read(replies: list[bytes], run: int) -> list[RingReply[Numbered]]:

@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 
-from rigwatch.wire.bus import MAX_PAYLOAD, QUEUE_CAPACITY, Bus, Inbox, RingQuestions
+from rigwatch.wire.bus import MAX_PAYLOAD, QUEUE_CAPACITY, Bus, Inbox, RingQuestions, sender_named
 from rigwatch.wire.delivery.ring import SOURCE_KEY
 from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import (
@@ -191,10 +191,9 @@ class SampleReader:
             self.rejected_by[sender] += 1
 
     def _token(self, _place: str, name: str | None, alive: bool) -> None:
-        if name is not None:
-            with contextlib.suppress(ValueError):
-                boot, since_ns, sender = name.split("/")
-                self._inbox.put((int(boot), int(since_ns), sender if alive else None))
+        if named := sender_named(name):
+            boot, since_ns, sender = named
+            self._inbox.put((boot, since_ns, sender if alive else None))
         if name is not None or not alive:
             self._end_assumed()
 

@@ -1,4 +1,4 @@
-"""The host: notifications, priority, threads of rigs, ports, signals, files, locks, clocks."""
+"""The host: notifications, priority, threads, ports, signals, files, output, locks, clocks."""
 
 from rigwatch.wire.host.both_clocks import both_clocks
 from rigwatch.wire.host.disk_space import free_share
@@ -9,9 +9,18 @@ from rigwatch.wire.host.few_pools import (
     tidy_memory,
     use_few_pools,
 )
-from rigwatch.wire.host.heartbeat import NO_ROUTER, WAITS, Heartbeat, waits_for_samples, waits_of
+from rigwatch.wire.host.heartbeat import (
+    DEVICE_SILENT,
+    NO_ROUTER,
+    NO_SAMPLES,
+    WAITS,
+    Heartbeat,
+    waits_for_samples,
+    waits_of,
+)
 from rigwatch.wire.host.one_keeper import Hold, Kept
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
+from rigwatch.wire.host.printer import Printer
 from rigwatch.wire.host.processes import end_process, end_with_parent, last_line
 from rigwatch.wire.host.realtime import (
     DAQ,
@@ -26,14 +35,17 @@ from rigwatch.wire.host.whole_file import replace_file, write_through
 
 __all__ = [
     "DAQ",
+    "DEVICE_SILENT",
     "MONITOR",
     "NO_ROUTER",
+    "NO_SAMPLES",
     "ROUTER",
     "WAITS",
     "Heartbeat",
     "Hold",
     "Kept",
     "Part",
+    "Printer",
     "Pulse",
     "RigPulse",
     "Work",

@@ -26,6 +26,10 @@ WAITS = "waits: "
 NO_ROUTER = "the router does not answer"
 """What a process says that waits for its router: no start of it anew would bring that back, and
 what it has to say to others would be lost."""
+NO_SAMPLES = "nothing comes from the device"
+"""What processes say that wait for a device whose line is open: it is switched off, or silent."""
+DEVICE_SILENT = frozenset(("starting", "stale", "garbage"))
+"""States of data acquisition in which that is so."""
 WAITS_AFTER = 5.0
 """Time without samples after which a process says that it waits [s]."""
 
@@ -63,7 +67,7 @@ class Heartbeat:
         self._address = _address(environment.get("NOTIFY_SOCKET", ""))
         self._socket: socket.socket | None = None
         self._said_at = -INTERVAL
-        self._said_count = 0
+        self._said_count = self._count = 0
         self._grown_at = clock()
         self._waits = ""
         if self._address:
@@ -83,14 +87,15 @@ class Heartbeat:
         now = self._clock()
         if self._socket is None or now - self._said_at < INTERVAL:
             return
-        if count > self._said_count:
-            self._grown_at = now
+        if count > self._count:
+            self._count, self._grown_at = count, now
         waits = waits if now - self._grown_at >= WAITS_AFTER else ""
         words = ["WATCHDOG=1"] if count > self._said_count or waits else []
         if waits != self._waits:
             words.append(f"STATUS={WAITS + waits if waits else 'running'}")
-        self._said_at, self._said_count, self._waits = now, count, waits
-        self._say("\n".join([*words, f"X_RIGWATCH_COUNT={count}"]))
+        self._said_at = now
+        if self._say("\n".join([*words, f"X_RIGWATCH_COUNT={count}"])):
+            self._said_count, self._waits = count, waits  # else it is said again
 
     def status(self, text: str) -> None:
         """Report one line for people, such as "reconnecting to the device"."""
@@ -100,11 +105,13 @@ class Heartbeat:
         """Report that the process is stopping."""
         self._say("STOPPING=1")
 
-    def _say(self, text: str) -> None:
-        # A lost or slow supervisor must never stop the process that it monitors.
+    def _say(self, text: str) -> bool:
+        """Whether the supervisor has it: a lost or slow one never stops what it monitors."""
         if self._socket is not None:
             with contextlib.suppress(OSError):
                 self._socket.sendto(text.encode(), self._address)
+                return True
+        return False
 
 
 def _address(path: str) -> str:

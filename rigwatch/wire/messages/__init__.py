@@ -48,7 +48,15 @@ from rigwatch.wire.messages.message_types import (
     SampleBlock,
     Severity,
 )
-from rigwatch.wire.messages.newest_alarms import MOST_ALARMS, remember, told_again, transitions
+from rigwatch.wire.messages.newest_alarms import (
+    MOST_ALARMS,
+    MOST_FIGURES,
+    MOST_SOURCES,
+    is_remembered,
+    remember,
+    told_again,
+    transitions,
+)
 from rigwatch.wire.messages.packed import UNFAMILIAR, decode_block, layout_of
 from rigwatch.wire.messages.quality_flags import (
     NON_FINITE,
@@ -94,6 +102,8 @@ __all__ = [
     "MODELS",
     "MONITOR_STALE",
     "MOST_ALARMS",
+    "MOST_FIGURES",
+    "MOST_SOURCES",
     "NON_FINITE",
     "NOT_PROVED",
     "PAST_KEY",
@@ -142,6 +152,7 @@ __all__ = [
     "decode_all",
     "decode_block",
     "encode",
+    "is_remembered",
     "is_source",
     "json_fields",
     "layout_of",

@@ -316,7 +316,7 @@ class ModelChange:
         user: who requested it.
         text: the reason, in words.
         model: the model file's text.
-        previous: the text of the previous one.
+        previous: the text of the previous one; "" where a message has no room for both.
         identity: whether the user was proved by a signature.
     """
 

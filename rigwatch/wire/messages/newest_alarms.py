@@ -1,12 +1,14 @@
-"""The newest change of each alarm, in bounded memory: a name costs a stranger nothing."""
+"""The newest of each alarm and process, in bounded memory: a name costs a stranger nothing."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 
 from rigwatch.wire.messages.message_types import Alarm
 
 MOST_ALARMS = 2048
 """Alarms that are remembered; a rig of 64 channels has a third of that."""
+MOST_SOURCES, MOST_FIGURES = 32, 100
+"""Processes whose health is remembered, the first that are heard, and figures of one."""
 
 
 def remember(alarms: dict[str, Alarm], alarm: Alarm) -> None:
@@ -19,6 +21,11 @@ def remember(alarms: dict[str, Alarm], alarm: Alarm) -> None:
     if len(alarms) > MOST_ALARMS:
         over = (name for name, one in alarms.items() if one.state == "normal")
         del alarms[next(over, next(iter(alarms)))]
+
+
+def is_remembered(known: Collection[str], source: str) -> bool:
+    """Whether the health of a process joins that of those that are known."""
+    return source in known or len(known) < MOST_SOURCES
 
 
 def transitions(alarms: Iterable[Alarm]) -> list[Alarm]:

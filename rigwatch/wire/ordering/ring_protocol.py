@@ -106,4 +106,6 @@ def _parsed(data: bytes, read: Callable[[bytes], S]) -> RingReply[S]:
             at += length
     except struct.error:
         raise MessageError(f"reply of the ring: {len(data)} bytes cannot be decoded") from None
+    if settled >= OPEN:  # the next question, one further, would not fit into its bytes
+        raise MessageError(f"reply of the ring: found number {settled}, expected one below {OPEN}")
     return RingReply(boot, settled, tuple(blocks))

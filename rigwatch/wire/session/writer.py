@@ -1,4 +1,5 @@
-"""Writes one MCAP file: every flush is one or two checksummed chunks, synced to the disk.
+"""Writes one MCAP file: every flush is one or two checksummed chunks, synced to the disk, or more
+where they would be too large to be read.
 
     magic, header
     chunk  schemas, channels, RunInfo
@@ -31,6 +32,7 @@ from rigwatch.wire.messages import (
     encode,
 )
 from rigwatch.wire.messages import protobuf_schema as schema
+from rigwatch.wire.session.chunks import LARGEST_CHUNK
 from rigwatch.wire.session.file_output import FileOutput
 from rigwatch.wire.session.merging import LARGEST_BLOCK, by_chunk, merge_pending
 from rigwatch.wire.session.packed_index import PackedIndex
@@ -42,6 +44,8 @@ FORMAT_KEY = "rigwatch_format"
 SOFTWARE = f"rigwatch {__version__}"
 SPILL = 2 * LARGEST_BLOCK
 """Most waiting samples before an automatic flush."""
+FULL = LARGEST_CHUNK // 8
+"""Size of messages with which a chunk ends: readers refuse one that is far larger [bytes]."""
 _NEVER = 1 << 62
 _CHANNEL_IDS = {line.message: number for number, line in enumerate(TOPICS, start=1)}
 
@@ -120,16 +124,22 @@ class SessionWriter:
         if not self.pending and not self._output.waiting:
             return
         for chunk in by_chunk(merge_pending(self.pending)):
+            size = 0
             for message in chunk:
-                self._add(message)
+                size += self._add(message)
+                if size >= FULL:
+                    self._mcap.flush()  # type: ignore[no-untyped-call]
+                    size = 0
             self._mcap.flush()  # type: ignore[no-untyped-call]
         self._output.commit()
         self.pending.clear()
         self._waiting = 0
 
-    def _add(self, message: Message) -> None:
-        t_ns = max(0, message_time(message))
-        self._mcap.add_message(_CHANNEL_IDS[type(message)], t_ns, encode(message), t_ns)
+    def _add(self, message: Message) -> int:
+        """Put a message into the present chunk; its size [bytes]."""
+        t_ns, data = max(0, message_time(message)), encode(message)
+        self._mcap.add_message(_CHANNEL_IDS[type(message)], t_ns, data, t_ns)
+        return len(data)
 
     def close(self) -> None:
         """Write the rest and the index, and close the file.

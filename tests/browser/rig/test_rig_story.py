@@ -8,7 +8,7 @@ import pytest
 
 from rigwatch.browser.rig.live_view import LiveView
 from rigwatch.browser.rig.promotions import can_roll_back, promotions
-from rigwatch.wire.messages.message_types import Health
+from rigwatch.wire.messages import MOST_SOURCES, Health
 from tests.browser.page import Page, browser, looking, serving
 from tests.bus.rig import ROOT
 from tests.workbench.rigs.test_rig_story import Shell, Watched
@@ -127,3 +127,14 @@ def test_a_rig_without_promotions_has_an_empty_history(tmp_path: Path) -> None:
     shell = Shell(tmp_path)
     assert promotions(shell.config, tmp_path) == []
     assert not can_roll_back(shell.config)
+
+
+def test_processes_that_are_made_up_are_bounded() -> None:
+    live = LiveView(256.0)
+    live.take(Health("monitor", 0, "running", "", {}), 0.0)
+    for number in range(3 * MOST_SOURCES):
+        live.take(Health(f"p{number}", 0, "running", "", {}), 0.0)
+    live.take(Health("monitor", 1, "stale", "", {}), 1.0)
+    found = {one["name"]: one["state"] for one in live.states(1.0, 3.0)["processes"]}
+    assert len(found) == MOST_SOURCES
+    assert found["monitor"] == "stale"

@@ -5,7 +5,8 @@ import msgspec
 from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.bus.commands.command_check import signed
 from rigwatch.wire.bus.commands.model_request import ModelReply, ModelRequest
-from rigwatch.wire.errors import BusError
+from rigwatch.wire.bus.transport import MAX_PAYLOAD
+from rigwatch.wire.errors import BusError, ModelError
 from rigwatch.wire.typed_files import JsonError, json_value
 
 KEY = "monitor/model"
@@ -19,8 +20,12 @@ def ask_for_model(bus: Bus, request: ModelRequest, timeout: float = PATIENCE) ->
     Raises:
         BusError: no monitor answers.
         KeysError: the operator's key cannot be read.
+        ModelError: the request is larger than the bus carries; nothing changes.
     """
     question = msgspec.json.encode(signed(bus, request))
+    if len(question) > MAX_PAYLOAD:
+        size = f"found a request of {len(question)} bytes, expected at most {MAX_PAYLOAD}"
+        raise ModelError(f"the new model is too large for a running monitor: {size}")
     for reply in bus.query(KEY, question, timeout):
         try:
             return json_value(reply, ModelReply)
