@@ -3,6 +3,7 @@
 adequate.py      the model on a healthy recording, other bases, outliers
 excitation.py    parameters that the training recordings do not excite
 failing_fit.py   where a model fails whose fit did not converge
+sign.py          an input that is counted the other way
 """
 
 from rigwatch.workbench.explain.adequacy.adequate import (
@@ -21,11 +22,13 @@ from rigwatch.workbench.explain.adequacy.excitation import (
     with_unjudged_told,
 )
 from rigwatch.workbench.explain.adequacy.failing_fit import with_failure_told
+from rigwatch.workbench.explain.adequacy.sign import reversed_input
 
 __all__ = [
     "SHORT",
     "cannot_tell",
     "inadequate",
+    "reversed_input",
     "stopped_by_outliers",
     "uncalibrated",
     "unchecked",
