@@ -28,7 +28,7 @@ def test_with_a_speed_that_is_counted_the_other_way_no_effect_is_named() -> None
     found = explained(bench(-1.0)).explanation
     assert found.verdict == "model_inadequate"
     assert found.text.startswith("voltage seems to be counted the other way than in the model")
-    assert "--map 'voltage=COLUMN * -1 [V]'" in found.text
+    assert "--map 'voltage=COLUMN * -1 [UNIT]'" in found.text
 
 
 def test_of_friction_that_leaves_as_much_with_the_models_sign_nothing_is_said() -> None:

@@ -22,30 +22,30 @@ from rigwatch.workbench.study import told
 MUCH = 0.2
 """Error over the spread of an output from which a model may have the wrong sign."""
 HALF = 0.5
-"""Share of both errors that a reversed input may leave at most."""
+"""Share of the error's energy that a reversed input may leave at most, of training and held out."""
 SAID = (
     "{name} seems to be counted the other way than in the model: reversed, it leaves {after:.3g} of"
     " {before:.3g} {unit} of what is held out; map the column with the factor -1 (--map"
-    " '{channel}=COLUMN * -1 [{in_unit}]'), or change its sign in the equations"
+    " '{channel}=COLUMN * -1 [UNIT]'), or change its sign in the equations"
 )
 
 
 def reversed_input(bench: Bench) -> Verdict | None:
-    """`model_inadequate` if the model leaves much, and with an input reversed at most half of it.
+    """`model_inadequate` if the model leaves much, and half its energy with an input reversed.
 
     A rough model has no signs to get wrong, and along the measured motion inputs are states.
     """
     if bench.data.along_motion or bench.study.model.rough or not _leaves_much(bench):
         return None
     base, unit = bench.base, bench.base.told_in
-    most = HALF * np.array([base.train_error, base.held_out_error])
+    most = np.sqrt(HALF) * np.array([base.train_error, base.held_out_error])
     for column, (name, own) in enumerate(bench.study.model.inputs.items()):
         errors = _errors_with(bench, column)
         if errors is not None and np.all(errors <= most):
             text = SAID.format(
                 name=name, after=told(float(errors[1]), unit),
                 before=told(base.held_out_error, unit), unit=unit,
-                channel=own.channel or name, in_unit=own.shown or own.unit,
+                channel=own.channel or name,
             )  # fmt: skip
             return Verdict("model_inadequate", None, (), (), text)
     return None
@@ -81,6 +81,4 @@ def _reversed(data: Data, column: int) -> Data:
         return replace(recording, inputs=inputs)
 
     opening = data.openings and turned(data.openings)
-    return replace(
-        data, train=turned(data.train), held_out=turned(data.held_out), openings=opening
-    )
+    return replace(data, train=turned(data.train), held_out=turned(data.held_out), openings=opening)
