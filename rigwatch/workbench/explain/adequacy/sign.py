@@ -1,28 +1,30 @@
-"""An input that the log counts the other way than the model.
+"""A channel that the log counts the other way than the model.
 
 With an input of the wrong sign the best fit hardly moves: a gain is on its bound at zero, or an
 inertia grows without end. Effects then explain parts of what the input does, and one may be named
 with confidence. A model that leaves much of what it should predict is therefore fitted once more
-with each input reversed, before anything is ranked.
+with each channel reversed, before anything is ranked.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
+from rigwatch.physics.engine.equations import Input, Output
 from rigwatch.physics.engine.fit import Recording
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.workbench.compare import Bench
-from rigwatch.workbench.data import Data
+from rigwatch.workbench.data import Data, parameters_of
 from rigwatch.workbench.explain.verdict import Verdict
-from rigwatch.workbench.fit import fit_base
+from rigwatch.workbench.fit import fit_model
 from rigwatch.workbench.study import told
 
 MUCH = 0.2
 """Error over the spread of an output from which a model may have the wrong sign."""
 HALF = 0.5
-"""Share of the error's energy that a reversed input may leave at most, of training and held out."""
+"""Share of the error's energy, training and held out, that a reversed channel leaves at most."""
 SAID = (
     "{name} seems to be counted the other way than in the model: reversed, it leaves {after:.3g} of"
     " {before:.3g} {unit} of what is held out; map the column with the factor -1 (--map"
@@ -30,25 +32,27 @@ SAID = (
 )
 
 
-def reversed_input(bench: Bench) -> Verdict | None:
-    """`model_inadequate` if the model leaves much, and half its energy with an input reversed.
+def reversed_channel(bench: Bench) -> Verdict | None:
+    """`model_inadequate` if the model leaves much, and half its energy with a channel reversed.
 
-    A rough model has no signs to get wrong, and along the measured motion inputs are states.
+    A rough model has no signs to get wrong, along the measured motion inputs are states, and a
+    model to which an effect was added has been asked before.
     """
-    if bench.data.along_motion or bench.study.model.rough or not _leaves_much(bench):
+    asked = bool(bench.study.file.effects)
+    signless = bench.data.along_motion or bench.study.model.rough
+    if asked or signless or not _leaves_much(bench):
         return None
     base, unit = bench.base, bench.base.told_in
     most = np.sqrt(HALF) * np.array([base.train_error, base.held_out_error])
-    for column, (name, own) in enumerate(bench.study.model.inputs.items()):
-        errors = _errors_with(bench, column)
-        if errors is not None and np.all(errors <= most):
-            text = SAID.format(
-                name=name, after=told(float(errors[1]), unit),
-                before=told(base.held_out_error, unit), unit=unit,
-                channel=own.channel or name,
-            )  # fmt: skip
-            return Verdict("model_inadequate", None, (), (), text)
-    return None
+    found = [(name, own, errors) for name, own, errors in _tried(bench) if np.all(errors <= most)]
+    if not found:
+        return None
+    name, own, errors = min(found, key=lambda each: each[2][0])
+    text = SAID.format(
+        name=name, after=told(float(errors[1]), unit), before=told(base.held_out_error, unit),
+        unit=unit, channel=own.channel or name,
+    )  # fmt: skip
+    return Verdict("model_inadequate", None, (), (), text)
 
 
 def _leaves_much(bench: Bench) -> bool:
@@ -57,28 +61,43 @@ def _leaves_much(bench: Bench) -> bool:
     return bool(np.any(bench.base.train.rms > MUCH * spread))
 
 
-def _errors_with(bench: Bench, column: int) -> FloatArray | None:
-    """Training and held-out error with one input reversed; None if that says nothing.
+def _tried(bench: Bench) -> Iterator[tuple[str, Input | Output, FloatArray]]:
+    """Name of a reversed channel, the channel, and the training and held-out error with it.
 
-    One that does not change, or not fit, does not.
+    Outputs are tried where there are several inputs: of one, reversing either is the same.
     """
-    if not np.ptp(bench.data.train.inputs[:, column]):
-        return None
-    data, scale = _reversed(bench.data, column), bench.base.train.scale
+    model, inputs = bench.study.model, bench.data.train.inputs
+    changing = [bool(np.ptp(column)) for column in inputs.T]
+    tried: list[tuple[str, Input | Output, str, int]] = [
+        (name, own, "inputs", i)
+        for i, (name, own) in enumerate(model.inputs.items())
+        if changing[i]
+    ]
+    if len(tried) > 1:
+        tried += [(name, own, "outputs", i) for i, (name, own) in enumerate(model.outputs.items())]
+    for name, own, side, column in tried:
+        errors = _errors_of(bench, _reversed(bench.data, side, column))
+        if errors is not None:
+            yield name, own, errors
+
+
+def _errors_of(bench: Bench, data: Data) -> FloatArray | None:
+    """Training and held-out error of the model on other data; None if it cannot be fitted."""
+    study, scale = bench.study, bench.base.train.scale
     try:
-        found = fit_base(bench.study, data, scale, multi_start=True)
+        found = fit_model(study, data, (), parameters_of(study.file), scale)
     except RigwatchError:
         return None
     return np.array([found.train_error, found.held_out_error])
 
 
-def _reversed(data: Data, column: int) -> Data:
-    """The training and held-out recordings with one input of the other sign."""
+def _reversed(data: Data, side: str, column: int) -> Data:
+    """The training and held-out recordings with one channel of the other sign."""
 
     def turned(recording: Recording) -> Recording:
-        inputs = recording.inputs.copy()
-        inputs[:, column] *= -1
-        return replace(recording, inputs=inputs)
+        channels = getattr(recording, side).copy()
+        channels[:, column] *= -1
+        return replace(recording, **{side: channels})
 
     opening = data.openings and turned(data.openings)
     return replace(data, train=turned(data.train), held_out=turned(data.held_out), openings=opening)
