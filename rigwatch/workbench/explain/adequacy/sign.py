@@ -48,11 +48,22 @@ def reversed_channel(bench: Bench) -> Verdict | None:
     if not found:
         return None
     name, own, errors = min(found, key=lambda each: each[2][0])
+    if _went_astray(bench, errors):
+        return None
     text = SAID.format(
         name=name, after=told(float(errors[1]), unit), before=told(base.held_out_error, unit),
         unit=unit, channel=own.channel or name,
     )  # fmt: skip
     return Verdict("model_inadequate", None, (), (), text)
+
+
+def _went_astray(bench: Bench, errors: FloatArray) -> bool:
+    """Whether the model leaves as little with no channel reversed, begun from the given values.
+
+    Its own fit has then ended in a local minimum.
+    """
+    plain = _errors_of(bench, bench.data)
+    return plain is not None and not np.all(errors <= np.sqrt(HALF) * plain)
 
 
 def _leaves_much(bench: Bench) -> bool:
