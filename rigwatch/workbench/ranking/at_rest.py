@@ -59,10 +59,10 @@ def begun_at_rest(
     for _ in range(STEPS):
         run = run_from(states)
         slopes = run.last_slopes[..., len(compiled.system.free) :] - np.eye(states.shape[1])
+        if not (np.isfinite(slopes).all() and np.isfinite(run.last).all()):
+            return initial
         steps = [np.linalg.lstsq(a, b)[0] for a, b in zip(slopes, run.last - states, strict=True)]
         states = states - np.array(steps)
-        if not np.isfinite(states).all():
-            return initial
     run = run_from(states)
     measured = recording.outputs[starts[resting, None] + np.arange(OPENING)]
     rests = (np.abs(run.outputs - measured) <= STILL * spread).all(axis=(1, 2))

@@ -6,6 +6,7 @@ import pytest
 from rigwatch.physics.engine.fit.recording import Recording, joined
 from rigwatch.workbench.compare.preparation import Bench, bench_of
 from rigwatch.workbench.data.signals import Data
+from rigwatch.workbench.ranking.at_rest import begun_at_rest
 from rigwatch.workbench.ranking.scoring import rank_all
 from tests.workbench.motors import motor_study
 from tests.workbench.simulated import knowing
@@ -37,3 +38,13 @@ def test_dry_friction_of_a_motor_that_starts_is_like_the_residual(started: Bench
     assert friction.p_value < 1e-3
     assert friction.cosines["brush_drop@winding"] > 0.95
     assert friction.explained > 0.9 * drop.explained
+
+
+def test_only_a_window_that_begins_at_rest_begins_at_the_models_rest(started: Bench) -> None:
+    base, initial = started.base, np.array([[0.3, -2.0], [20.0, 1.0]])
+    found = begun_at_rest(
+        base.compiled, started.data.train, np.array([0, REST + 1]),
+        initial=initial, parameters=base.train.parameters, substeps=4,
+    )  # fmt: skip
+    np.testing.assert_allclose(found[0], 0.0, atol=1e-6)
+    np.testing.assert_array_equal(found[1], initial[1])
