@@ -165,6 +165,8 @@ def test_what_to_do_next_is_told_where_the_recordings_do_not_decide(study: Study
         "record another motion, list it under [[train]] in rub/study.toml, and explain again; or,"
         " if you know that it is coulomb@load: rigwatch add rub coulomb --port load"
     )
+    beside = next_step(replace(found, ranking=[best], beside=["lag@drive"]), "rub")
+    assert beside.endswith("rigwatch add rub coulomb --port load --with lag@drive")
     named = replace(found, verdict="missing_effect", ranking=[best])
     assert next_step(named, "rub") == next_command(named, "rub")
     assert next_step(replace(found, verdict="nothing_missing"), "rub") == ""

@@ -15,6 +15,7 @@ from rigwatch.workbench.data import predicts_along_motion
 from rigwatch.workbench.explain.adequacy import (
     cannot_tell,
     inadequate,
+    reversed_channel,
     stopped_by_outliers,
     unchecked,
     unexcited,
@@ -366,6 +367,8 @@ def _by_pairs(bench: Bench, rows: list[Ranked], verdict: Verdict, progress: Prog
 def _stopped(bench: Bench) -> Verdict | None:
     """The verdict if the model is not fit to judge effects, otherwise None."""
     kept, bare = bench.study.kept, bench.bare
+    if (reverse := reversed_channel(bench)) is not None:
+        return reverse
     failed = not_converged({"the model": bench.base.convergence})
     if failed is not None:
         return with_failure_told(bench, failed)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 from rigwatch.workbench.compare import Bench, Comparison, added_variances, comparison, unweighed
 from rigwatch.workbench.experiment import Experiment, propose
-from rigwatch.workbench.explain.adequacy import uncalibrated
+from rigwatch.workbench.explain.adequacy import ends_of_range, uncalibrated
 from rigwatch.workbench.explain.exchange import Exchange
 from rigwatch.workbench.explain.remaining_error import remaining_share, shows_little_of_it
 from rigwatch.workbench.explain.verdict import Verdict
@@ -110,6 +110,7 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
     members = [*verdict.members, *verdict.rivals]
     more, told = _of_the_strength(bench, verdict)
     told += _assumed(bench.study) if verdict.word in UNEXPLAINED else []
+    told += ends_of_range(bench)
     compared = comparison(bench)
     compared = replace(compared, remarks=[*compared.remarks, *told])
     listed = [

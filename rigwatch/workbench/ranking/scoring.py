@@ -20,6 +20,7 @@ from rigwatch.physics.engine.score import (
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit import Fitted, nodes
+from rigwatch.workbench.ranking.at_rest import begun_at_rest
 from rigwatch.workbench.ranking.candidates import candidates
 from rigwatch.workbench.ranking.ranked import Ranked, row_of
 from rigwatch.workbench.ranking.separate_recordings import per_recording
@@ -62,9 +63,13 @@ def _along(data: Data, base: Fitted, found: Sequence[Candidate]) -> tuple[FloatA
     fitted, recording = _scored_fit(base), data.train
     cut = windows(base.compiled.system, len(recording), base.horizon)
     substeps = nodes(base, recording)
+    resting = begun_at_rest(
+        base.compiled, recording, cut.starts,
+        initial=fitted.initial, parameters=fitted.parameters, substeps=substeps,
+    )  # fmt: skip
     at = trajectory(
         base.compiled, recording.inputs, recording.spacing, cut.starts, cut.length,
-        initial=fitted.initial, parameters=fitted.parameters, substeps=substeps,
+        initial=resting, parameters=fitted.parameters, substeps=substeps,
         begins=recording.begins,
     )  # fmt: skip
     run = base.compiled.simulate(

@@ -173,6 +173,11 @@ def next_command(found: Explanation, study: str) -> str:
     """
     if found.verdict != "missing_effect" or not found.ranking:
         return ""
+    return _adding(found, study)
+
+
+def _adding(found: Explanation, study: str) -> str:
+    """The command that adds the best effect, beside those without which it is refused."""
     best = found.ranking[0]
     others = f" --with {' '.join(found.beside)}" if found.beside else ""
     return f"rigwatch add {study} {best.effect} --port {best.port}{others}"
@@ -189,10 +194,9 @@ def next_step(found: Explanation, study: str) -> str:
         return next_command(found, study)
     best = found.ranking[0]
     what = "record that experiment" if found.next_experiment else "record another motion"
-    add = f"rigwatch add {study} {best.effect} --port {best.port}"
     return (
         f"{what}, list it under [[train]] in {study}/{FILE}, and explain again; or, if you know"
-        f" that it is {best.effect}@{best.port}: {add}"
+        f" that it is {best.effect}@{best.port}: {_adding(found, study)}"
     )
 
 

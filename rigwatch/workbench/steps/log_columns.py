@@ -14,6 +14,7 @@ from rigwatch.wire.units import is_unit, may_count_turns, unit_of
 TIMES = ("time", "t", "timestamp", "time_stamp", "seconds", "sec")
 """Names of a time column."""
 PER_MINUTE = Fraction(1, 60)
+IN_CELSIUS = "; for degrees Celsius give --map '{channel}={column}[degC]'"
 _GIVEN_UNIT = re.compile(r"\[\s*([^\[\]]*?)\s*\]\s*$")
 
 
@@ -224,7 +225,10 @@ def _unit(header: Header, channel: str, signal: Input | Output) -> tuple[str, li
     if not unit and header.unknown and wanted not in ("", "1"):
         raise ModelError(_no_unit(header, f"--map '{channel}={header.column}[{wanted}]'"))
     if not unit:
-        return wanted, [f"{header.column}: no unit in its header, assumed {wanted}"]
+        return wanted, [
+            f"{header.column}: no unit in its header, assumed {wanted}"
+            + (IN_CELSIUS.format(channel=channel, column=header.column) if wanted == "K" else "")
+        ]
     if turns := _as_turns(unit, wanted):
         return turns, [f"{header.column}: {unit} is read as {turns}"]
     if may_count_turns(unit, wanted):

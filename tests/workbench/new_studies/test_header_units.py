@@ -62,6 +62,14 @@ def test_the_steps_of_a_study_are_told_in_the_unit_of_its_log(tmp_path, run, cap
     assert shown.split()[-4:] == ["coulomb@shaft", "3", "6", "rpm"]
 
 
+def test_a_temperature_without_a_unit_may_be_in_degrees_celsius():
+    columns = ["time", "power", "ambient", "temperature"]
+    found = matched(columns, shipped_models()["heated-block"], {})
+    said = "temperature: no unit in its header, assumed K; for degrees Celsius give"
+    assert f"{said} --map 'temperature=temperature[degC]'" in found.remarks
+    assert "power: no unit in its header, assumed W" in found.remarks
+
+
 def test_a_unit_that_is_not_known_is_asked_for(tmp_path, run, capsys):
     assert made(tmp_path, run, "Speed [turns/min]") == 2
     said = capsys.readouterr().err

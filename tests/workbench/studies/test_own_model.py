@@ -78,6 +78,16 @@ def test_without_ports_it_is_compared_and_explain_asks_for_one(tmp_path: Path) -
         ("parameters.a", "parameters.v", "parameters.v: found 'v' again after states.v"),
         ('measured = "v"', 'measured = "vel"', "states.v.measured: found channel 'vel'.*: u, v"),
         (
+            'measured = "v"',
+            'measured = "u"',
+            "states.v.measured: found channel 'u' in V for a state in rad/s, expected one unit",
+        ),
+        (
+            'measured = "v"',
+            'rate_of = "v"',
+            "states.v.rate_of: found channel 'v' in rad/s for a state in rad/s, expected its rate",
+        ),
+        (
             "a = { value = 1.0",
             "a = { low = 3.0, value = 1.0",
             "parameters.a: found value = 1, expected at least 3 1/s",

@@ -8,12 +8,12 @@ import keyword
 from msgspec.structs import replace
 
 from rigwatch.physics.engine.equations.expression import FUNCTIONS, parse
-from rigwatch.physics.engine.equations.model import Model
+from rigwatch.physics.engine.equations.model import Input, Model, Output, State
 from rigwatch.physics.engine.equations.scope import symbol
 from rigwatch.physics.engine.equations.system import PROBE, TIME, UNTIL, System, compose
 from rigwatch.physics.engine.equations.variants import with_variants
 from rigwatch.wire.errors import ModelError
-from rigwatch.wire.units import unit_of
+from rigwatch.wire.units import times, unit_of
 
 _TABLES = ("inputs", "states", "parameters", "quantities", "ports")
 
@@ -112,10 +112,9 @@ def _check_bounds(model: Model) -> None:
 
 
 def _check_channels(model: Model) -> None:
-    """Check that the channels named by states are channels of the model."""
-    known = {own.channel or name for name, own in model.inputs.items()}
-    known |= {own.channel or name for name, own in model.outputs.items()}
-    known |= {*model.inputs, *model.outputs}
+    """Check that the channels named by states are channels of the model, in the states' units."""
+    known: dict[str, Input | Output] = {**model.inputs, **model.outputs}
+    known |= {own.channel: own for own in [*known.values()] if own.channel}
     for name, state in model.states.items():
         for key in ("measured", "rate_of"):
             channel = getattr(state, key)
@@ -124,6 +123,22 @@ def _check_channels(model: Model) -> None:
                     f"states.{name}.{key}: found channel {channel!r}, expected one of the model's:"
                     f" {', '.join(sorted(known))}"
                 )
+            if channel:
+                _check_unit(f"states.{name}.{key}", state, channel, known[channel])
+
+
+def _check_unit(key: str, state: State, channel: str, own: Input | Output) -> None:
+    """Check that a channel can be a state, or that the state can be its rate."""
+    rate = key.endswith("rate_of")
+    told, has = (part.shown or part.unit for part in (own, state))
+    fits = times(unit_of(own.unit).dimension, unit_of("s").dimension, -1 if rate else 0)
+    if unit_of(state.unit).dimension != fits:
+        raise ModelError(
+            f"{key}: found channel {channel!r} in {told} for a state in {has}, expected"
+            f" {'its rate of change' if rate else 'one unit'}: convert the log's column, as with"
+            f" --map '{channel}=COLUMN * FACTOR [UNIT]', or leave the key out, so that a fit"
+            " estimates the state from the outputs"
+        )
 
 
 def _check_sensors(model: Model) -> None:

@@ -1,8 +1,10 @@
 """Whether the model is fit to judge effects, and what to look at if it is not.
 
 adequate.py      the model on a healthy recording, other bases, outliers
+ends_of_range.py readings at the end of a sensor's range
 excitation.py    parameters that the training recordings do not excite
 failing_fit.py   where a model fails whose fit did not converge
+sign.py          a channel that is counted the other way
 """
 
 from rigwatch.workbench.explain.adequacy.adequate import (
@@ -15,17 +17,21 @@ from rigwatch.workbench.explain.adequacy.adequate import (
     with_base_offered,
     with_change_told,
 )
+from rigwatch.workbench.explain.adequacy.ends_of_range import ends_of_range
 from rigwatch.workbench.explain.adequacy.excitation import (
     cannot_tell,
     unexcited,
     with_unjudged_told,
 )
 from rigwatch.workbench.explain.adequacy.failing_fit import with_failure_told
+from rigwatch.workbench.explain.adequacy.sign import reversed_channel
 
 __all__ = [
     "SHORT",
     "cannot_tell",
+    "ends_of_range",
     "inadequate",
+    "reversed_channel",
     "stopped_by_outliers",
     "uncalibrated",
     "unchecked",
