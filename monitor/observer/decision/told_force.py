@@ -17,6 +17,7 @@ from monitor.observer.decision.decision_state import (
     WET,
     DecisionState,
 )
+from monitor.observer.decision.deviation import late_variance
 from monitor.observer.decision.window_statistics import (
     RIDGE,
     reversals,
@@ -81,7 +82,9 @@ def force_of_changed_motion(alone: float, spread: float, slow: float, kept: Deci
     Friction changes the motion, and what the equations mispredict of the change is like damping, of
     either sign, and like mass. Damping that pushes, which no friction does, would make dry friction
     alone appear smaller: the force beside both is told. Damping that hinders may as well be what
-    smoothing and presliding round off. Only reversals tell dry friction from either.
+    smoothing and presliding round off. Only reversals tell dry friction from either. What is not
+    known of the inputs' lateness repeats with the motion, and may at worst all look like the
+    difference.
 
     Args:
         alone: force of dry friction alone [N].
@@ -91,14 +94,15 @@ def force_of_changed_motion(alone: float, spread: float, slow: float, kept: Deci
     """
     if reversals(kept, LONG, slow) < OFTEN:
         return alone
-    beside, sure = _beside_change(kept, LONG, spread)
-    return beside if (beside - alone) * sure > PUSHES * beside else alone
+    beside, left, used = _beside_change(kept, LONG)
+    unsure = PUSHES * spread + np.sqrt(used * late_variance(kept))
+    return beside if (beside - alone) * np.sqrt(left) > unsure else alone
 
 
 @part()
-def _beside_change(kept: DecisionState, length: int, spread: float) -> tuple[float, float]:
-    """Force of dry friction beside what is mispredicted of the motion that it has changed [N], and
-    the same in standard deviations.
+def _beside_change(kept: DecisionState, length: int) -> tuple[float, float, int]:
+    """Force of dry friction beside what is mispredicted of the motion that it has changed [N], what
+    determines it, and the number of samples that count.
 
     To first order that is a combination of viscous friction and of the predicted acceleration, as
     friction mostly changes size and phase of the motion.
@@ -106,14 +110,15 @@ def _beside_change(kept: DecisionState, length: int, spread: float) -> tuple[flo
     Args:
         kept: the window's rows.
         length: of the window [samples].
-        spread: what a healthy rig leaves, as a standard deviation.
     """
+    used = 0
     a = b = c = p = q = d = f = h = r = yy = 0.0
     for ago in range(1, min(length, kept.counts[FILLED]) + 1):
         if not slides_on(kept, ago):
             continue
         row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
         dry, wet, moved, error = row[DRY], row[WET], row[LEVEL], row[ERROR]
+        used += 1
         a += dry * dry
         b += dry * wet
         c += wet * wet
@@ -125,11 +130,11 @@ def _beside_change(kept: DecisionState, length: int, spread: float) -> tuple[flo
         r += moved * error
         yy += error * error
     if h <= 0.0:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0
     h *= 1.0 + RIDGE
     products = a - d * d / h, b - d * f / h, c - f * f / h
     force, _, left, _, _ = solved(*products, p - d * r / h, q - f * r / h, yy, 0.0)
-    return force, force * np.sqrt(left) / spread
+    return force, left, used
 
 
 @part(allocates=True)
