@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from monitor.observer.decision import window_statistics
+from monitor.observer.decision import told_force, window_statistics
 from monitor.observer.decision.decision_state import (
     AT,
     BARE,
@@ -23,7 +23,7 @@ from monitor.observer.missing_force import high_pass
 from rigwatch.wire.arrays import FloatArray
 from tests.compiled import from_python
 
-dry_force = from_python(window_statistics.dry_force)
+dry_force = from_python(told_force.dry_force)
 friction = from_python(window_statistics.friction)
 onset_evidence = from_python(window_statistics.onset_evidence)
 

@@ -29,11 +29,11 @@ from monitor.observer.decision.decision_state import (
     DecisionState,
 )
 from monitor.observer.decision.deviation import SURELY_NEW
+from monitor.observer.decision.told_force import dry_force, force_of_changed_motion
 from monitor.observer.decision.window_statistics import (
     SEEN,
     add_unrecorded,
     drive_explains,
-    dry_force,
     friction,
     rest,
     reversals,
@@ -135,6 +135,9 @@ def _verdict(
     count[AGREED] = count[AGREED] + 1 if agrees and count[DISAGREED] == 0 else 0
     if fits:
         kept.value[1] = acting
+        if since >= LONG:
+            slow = rules.speed_noise
+            kept.value[1] = force_of_changed_motion(acting, spread, slow, kept)
     if count[AGREED] >= LOOKS or before in (FRICTION, STICKING):
         return STICKING if still > STUCK or before == STICKING else FRICTION
     return OTHER if since > rules.patience else UNNAMED

@@ -24,8 +24,6 @@ from monitor.observer.decision.decision_state import (
     WET,
     DecisionState,
 )
-from rigwatch.physics.transfer import filter_sample
-from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import part
 
 (
@@ -84,7 +82,7 @@ def lasting_energy(kept: DecisionState, allowed: float) -> float:
 
 
 @part()
-def _slides(kept: DecisionState, ago: int) -> bool:
+def slides(kept: DecisionState, ago: int) -> bool:
     """Whether the motion has kept its direction long enough for real friction to change sign.
 
     Contacts deform before they slide, and sensors are delayed.
@@ -98,7 +96,7 @@ def _slides(kept: DecisionState, ago: int) -> bool:
 
 
 @part()
-def _slides_on(kept: DecisionState, ago: int) -> bool:
+def slides_on(kept: DecisionState, ago: int) -> bool:
     """Whether it slides and the speed, going on as it does, keeps its direction to the next sample.
 
     Strong friction bends the speed where it reverses, and smoothing delays the reversal of a bent
@@ -107,7 +105,7 @@ def _slides_on(kept: DecisionState, ago: int) -> bool:
     head = kept.counts[HEAD]
     speed = kept.rows[(head - ago) % HISTORY, SPEED]
     following = 2.0 * speed - kept.rows[(head - ago - 1) % HISTORY, SPEED]
-    return bool(speed * following > 0.0) and _slides(kept, ago)
+    return bool(speed * following > 0.0) and slides(kept, ago)
 
 
 @part()
@@ -123,7 +121,7 @@ def friction(
     used = 0
     a = b = c = p = q = yy = 0.0
     for ago in range(1, n + 1):
-        if not _slides_on(kept, ago):
+        if not slides_on(kept, ago):
             continue
         row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
         used += 1
@@ -133,7 +131,7 @@ def friction(
         p += row[DRY] * row[ERROR]
         q += row[WET] * row[ERROR]
         yy += row[ERROR] * row[ERROR]
-    force, viscous, left, both, dry = _solved(a, b, c, p, q, yy, used * spread * spread)
+    force, viscous, left, both, dry = solved(a, b, c, p, q, yy, used * spread * spread)
     return force, viscous, force * np.sqrt(left) / spread, both, dry
 
 
@@ -171,7 +169,7 @@ def onset_evidence(kept: DecisionState, spread: float, unsure: float, jumps: boo
 
 
 @part()
-def _solved(  # noqa: PLR0917 -- sums
+def solved(  # noqa: PLR0917 -- sums
     a: float, b: float, c: float, p: float, q: float, yy: float, healthy: float
 ) -> tuple[float, float, float, float, float]:
     """Coulomb force, viscous coefficient, what determines the former, and the two shares.
@@ -202,64 +200,6 @@ def _beyond(energy: float, healthy: float) -> float:
 
 
 @part()
-def dry_force(
-    kept: DecisionState, surely: int, length: int, high_pass: FloatArray
-) -> tuple[float, float]:
-    """Force of dry friction alone [N], over a window and over the part of it in which it acts.
-
-    A steady motion hardly distinguishes viscous friction from it, and a joint fit would assign to
-    viscous friction what smoothing and presliding round off. Friction is noticed a little after it
-    begins: of the instants at which it may have begun, the second force is of that from which on
-    friction explains most energy (a change point by maximum likelihood). Samples from before would
-    make it appear smaller.
-    Over a whole window the sample before a reversal counts: the high-passed force is largest there,
-    and without it strong friction appears a tenth smaller.
-
-    Args:
-        kept: the window's rows.
-        surely: newest samples in which friction acts, if it does.
-        length: of the window [samples].
-        high_pass: of the judged signals, see `DecisionRules`.
-    """
-    n = min(length, kept.counts[FILLED])
-    a = p = 0.0
-    for ago in range(1, n + 1):
-        if _slides(kept, ago):
-            row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
-            a += row[DRY] * row[DRY]
-            p += row[DRY] * row[ERROR]
-    whole = p / a if a > 0.0 else 0.0
-    if surely >= n:
-        return whole, whole
-    most = acting = 0.0
-    for start in range(surely, n + 1):
-        force, explained = _force_since(kept, start, high_pass)
-        if force > 0.0 and explained > most:
-            most, acting = explained, force
-    return whole, acting
-
-
-@part(allocates=True)
-def _force_since(kept: DecisionState, start: int, high_pass: FloatArray) -> tuple[float, float]:
-    """Force of dry friction that begins with the sample `start` ago [N], and what it explains.
-
-    A high-passed force that reverses is twice the step with which one begins that was not there:
-    compared with the response to friction that has always acted, friction that has just begun
-    would appear half as large until the high-pass has forgotten, and its beginning earlier than it
-    is.
-    """
-    a = p = 0.0
-    state = np.zeros(high_pass.shape[1] - 1)
-    for ago in range(start, 0, -1):
-        row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
-        unit = filter_sample(high_pass[0], high_pass[1], state, row[BARE])
-        if _slides_on(kept, ago):
-            a += unit * unit
-            p += unit * row[ERROR]
-    return (p / a, p * p / a) if a > 0.0 else (0.0, 0.0)
-
-
-@part()
 def drive_explains(kept: DecisionState, length: int, spread: float) -> float:
     """Share of the residual beyond its healthy variance that a weaker drive explains.
 
@@ -269,7 +209,7 @@ def drive_explains(kept: DecisionState, length: int, spread: float) -> float:
     used = 0
     a = p = yy = 0.0
     for ago in range(1, n + 1):
-        if not _slides_on(kept, ago):
+        if not slides_on(kept, ago):
             continue
         row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
         used += 1
@@ -304,7 +244,7 @@ def add_unrecorded(kept: DecisionState, spread: float, slow: float) -> None:
         side = 1.0 if row[SPEED] > 0.0 else -1.0
         sums[TURNS] += 1.0 if sums[SIDE] == -side else 0.0
         sums[SIDE] = side
-    if not _slides_on(kept, 1):
+    if not slides_on(kept, 1):
         return
     sums[USED] += 1.0
     sums[DRY_DRY] += row[DRY] * row[DRY]
@@ -331,7 +271,7 @@ def unrecorded_friction(kept: DecisionState) -> tuple[float, float, float, float
     alike = s[DRY_WET] ** 2 > ALIKE * s[DRY_DRY] * s[WET_WET]
     if s[SEEN] < 2.0 * UNRECORDED or s[TURNS] < FEWEST_TURNS or s[DRY_DRY] <= 0.0 or alike:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    beside, _, _, both, dry = _solved(
+    beside, _, _, both, dry = solved(
         s[DRY_DRY], s[DRY_WET], s[WET_WET], s[DRY_ERROR], s[WET_ERROR], s[ENERGY], s[HEALTHY]
     )
     drive = _drive_share(s[DRIVEN_DRIVEN], s[DRIVEN_ERROR], s[ENERGY], s[HEALTHY])
