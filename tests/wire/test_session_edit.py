@@ -263,3 +263,14 @@ def test_no_damage_makes_a_command_fall_over(
     except RigwatchError as error:
         one_line = str(error)
         assert "\n" not in one_line, one_line
+
+
+@pytest.mark.parametrize("start", ["1e12", "1e30"])
+def test_a_span_beyond_all_dates_is_refused_in_a_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], start: str
+) -> None:
+    with SessionWriter(tmp_path / "run.mcap", run_info("bench", 256.0, t_ns=T0)) as writer:
+        writer.write(samples(0, 10))
+    words = ["trim", f"{tmp_path / 'run.mcap'}", f"{tmp_path / 'part.mcap'}", "--start", start]
+    assert main(words) == 2
+    assert "found no samples from" in capsys.readouterr().err
