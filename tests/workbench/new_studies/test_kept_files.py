@@ -108,3 +108,9 @@ def test_the_ledger_of_an_earlier_study_is_not_continued(tmp_path, model, capsys
 def test_a_log_that_is_not_there_is_named(tmp_path, model, capsys):
     assert new(tmp_path / "study", tmp_path / "run.mcap", model) == 2
     assert "run.mcap: found no such file" in capsys.readouterr().err
+
+
+def test_a_log_may_have_any_name(tmp_path, model):
+    log = session(tmp_path / "logs" / 'run "ä" 1.mcap')
+    assert new(tmp_path / "study", log, model) == 0
+    assert {span.session for span in open_study(tmp_path / "study").file.train} == {log.name}
