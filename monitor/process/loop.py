@@ -108,6 +108,15 @@ class MonitorProcess:
         self.rig = RigMonitor(model, section.alarms, detectors, str(path), friction)
         self.bus = bus
         self._alone, self._journal, self._cursor, self._said = _opened(section.journal)
+        try:
+            self._begin(config, section)
+        except BaseException:
+            self._give_up()
+            raise
+
+    def _begin(self, config: RigConfig, section: MonitorSection) -> None:
+        """Join the bus with what the rig's files say."""
+        bus = self.bus
         self._done = self._cursor.read() if self._cursor else None
         self._stale_after = config.stale_after
         self._time = RigTime(*both_clocks())
@@ -255,6 +264,10 @@ class MonitorProcess:
         self.reader.close()
         self._explainer.close()
         self._models.close()
+        self._give_up()
+
+    def _give_up(self) -> None:
+        """Close the rig's files, its lock last."""
         for kept in (self._journal, self._cursor, self._said):
             if kept:
                 kept.close()
@@ -402,8 +415,10 @@ def _opened(
         kept = AlarmJournal(journal)
         opened.callback(kept.close)
         cursor = Cursor(f"{journal}.position")
+        opened.callback(cursor.close)
+        said = _said(journal)
         opened.pop_all()
-        return alone, kept, cursor, _said(journal)
+        return alone, kept, cursor, said
 
 
 def _said(journal: str) -> KeptMessages:

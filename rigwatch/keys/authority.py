@@ -4,10 +4,13 @@ The common name of a certificate is `<name>.<serial>`. The router admits the com
 register lists as valid, so a revoked certificate stays invalid when its name is issued again.
 """
 
+import fcntl
 import ipaddress
+import os
 import re
 import socket
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -17,7 +20,15 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from rigwatch.wire.access import REGISTER, ROLES, Issued, Register, authority_file, key_files
+from rigwatch.wire.access import (
+    REGISTER,
+    ROLES,
+    Issued,
+    Register,
+    authority_file,
+    key_files,
+    read_register,
+)
 from rigwatch.wire.errors import KeysError, reason_of
 from rigwatch.wire.host import replace_file
 from rigwatch.wire.typed_files import json_value
@@ -91,6 +102,10 @@ class Authority:
         if role not in ROLES:
             raise KeysError(f"role: found {role!r}, expected one of {', '.join(ROLES)}")
         _check_name("name", name)
+        with self._alone():
+            return self._issued(name, role, addresses)
+
+    def _issued(self, name: str, role: str, addresses: Iterable[str]) -> Issued:
         serial = 1 + max((one.serial for one in self.register.issued), default=0)
         ends = self._end()
         issued = Issued(name, role, serial, ends.strftime("%Y-%m-%d"))
@@ -121,11 +136,24 @@ class Authority:
         Raises:
             KeysError: there is no valid one.
         """
-        found = [one for one in self.register.issued if one.name == name and not one.revoked]
-        if not found:
-            raise KeysError(f"{name}: has no valid certificate in {self.folder}")
-        self._save(self._without(name))
+        with self._alone():
+            found = [one for one in self.register.issued if one.name == name and not one.revoked]
+            if not found:
+                raise KeysError(f"{name}: has no valid certificate in {self.folder}")
+            self._save(self._without(name))
         return found[-1]
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Change the register as it is now, while no other process does: no revocation is lost."""
+        folder = os.open(self.folder, os.O_RDONLY)
+        try:
+            with suppress(OSError):  # a file system without locks
+                fcntl.flock(folder, fcntl.LOCK_EX)
+            self.register = read_register(self.folder)
+            yield
+        finally:
+            os.close(folder)
 
     def _without(self, name: str) -> tuple[Issued, ...]:
         return tuple(

@@ -292,3 +292,32 @@ def test_names_of_new_things_are_plain(tmp_path: Path) -> None:
         with pytest.raises(PlaceError):
             places.new(name)
     assert places.new("my study-1.a") == tmp_path.resolve() / "my study-1.a"
+
+
+def test_a_recording_that_is_taken_in_twice_at_once_stays(served: Served) -> None:
+    """A second click on the button while the first one's request runs."""
+    upload = json.loads(ask(served, "/api/upload/twice.csv", "PUT", body=LOG)[1])["upload"]
+    mapping = {"channels": {"position": "x[m]"}, "time": "t[s]"}
+    body = json.dumps({"upload": upload, "name": "twice", "mapping": mapping}).encode()
+    found: list[int] = []
+    clicks = [
+        threading.Thread(
+            target=lambda: found.append(ask(served, "/api/import", "POST", body=body)[0])
+        )
+        for _ in range(3)
+    ]
+    for click in clicks:
+        click.start()
+    for click in clicks:
+        click.join()
+    assert found.count(200) == 1, found
+    assert (served.folder / "recordings" / "twice.mcap").is_file()
+
+
+def test_a_folder_that_takes_no_recordings_is_told_in_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / "recordings").write_text("no folder")
+    with serving(tmp_path) as own:
+        upload = json.loads(ask(own, "/api/upload/run.csv", "PUT", body=LOG)[1])["upload"]
+        body = json.dumps({"upload": upload, "name": "run", "mapping": {}}).encode()
+        status, text = ask(own, "/api/import", "POST", body=body)
+    assert (status, "recordings: file exists" in text) == (409, True), text

@@ -254,3 +254,19 @@ def test_a_certificate_ends_with_its_authority_and_none_is_issued_after_that(
     ended = Authority.create(tmp_path / "ended", "bench")
     with pytest.raises(KeysError, match=r"ended: the authority has ended on .*`rigwatch keys new`"):
         ended.issue("daq", "daq")
+
+
+def test_what_two_change_at_once_is_all_in_the_register(tmp_path: Path) -> None:
+    """Whoever opened the register before another's change does not undo it: a lost key is lost."""
+    first = Authority.create(tmp_path / "keys", "bench")
+    for name in ("ann", "bob"):
+        first.issue(name, "operator")
+    second = Authority(tmp_path / "keys")
+    first.revoke("ann")
+    issued = second.issue("cleo", "operator")
+    third = Authority(tmp_path / "keys")
+    revoked = {one.name: one.revoked for one in third.register.issued}
+    assert revoked == {"ann": True, "bob": False, "cleo": False}
+    assert issued.serial == 3
+    with pytest.raises(KeysError, match="has no valid certificate"):
+        second.revoke("ann")

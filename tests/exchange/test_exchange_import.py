@@ -478,3 +478,42 @@ def test_the_rate_beside_a_jump_of_the_clock_is_that_of_the_samples(tmp_path: Pa
     assert grid.rate_hz == 256.0
     assert grid.own.sum() == 2048
     assert grid.in_hole.sum() == 5 * 256
+
+
+def test_steps_of_two_lengths_lose_no_sample(tmp_path: Path) -> None:
+    """No step is near the median of a log whose steps alternate between short and long ones."""
+    times = np.cumsum([0.0] + [1.0, 5.0] * 10)
+    file = tmp_path / "log.csv"
+    file.write_text("t,x\n" + "".join(f"{t},{2 * t}\n" for t in times))
+    mapping = ImportMapping(channels={"position": "x[m]"}, time="t[s]")
+    made = import_file(file, tmp_path / "log.mcap", mapping)
+    assert (made.rate_hz, made.samples) == (1.0, 61)
+    column = next(open_session(made.path).samples()).channel("position")
+    assert np.allclose(column.values, 2 * np.arange(61))
+
+
+@pytest.mark.parametrize(
+    ("text", "mapping"),
+    [
+        ('{"t": [], "x": [1, 2]}', ImportMapping(channels={"position": "x[m]"}, time="t[s]")),
+        ('{"x": [], "y": [1, 2]}', ImportMapping(channels={"position": "x[m]"}, rate=1.0)),
+    ],
+)
+def test_a_column_without_values_is_named(
+    tmp_path: Path, text: str, mapping: ImportMapping
+) -> None:
+    (tmp_path / "log.json").write_text(text)
+    with pytest.raises(ImportDataError, match=r"found no values in '[tx]', expected at least one"):
+        import_file(tmp_path / "log.json", tmp_path / "log.mcap", mapping)
+
+
+def test_a_number_of_hundreds_of_digits_is_no_value(tmp_path: Path) -> None:
+    file, digits = tmp_path / "log.json", "1" + "0" * 400
+    file.write_text(f'{{"t": [0, 1, 2], "x": [1, 2, 3], "y": [1, {digits}, 3], "id": {digits}}}')
+    known = ImportMapping(channels={"position": "x[m]"}, time="t[s]")
+    assert import_file(file, tmp_path / "log.mcap", known).samples == 3
+    wrong = ImportMapping(channels={"position": "y[m]"}, time="t[s]")
+    with pytest.raises(
+        ImportDataError, match=r"row 2, column y: found .* expected a finite number"
+    ):
+        import_file(file, tmp_path / "other.mcap", wrong)

@@ -8,7 +8,7 @@ import pytest
 from monitor.process.loop import MonitorProcess, suitable_model
 from monitor.process.startup_grace import Patience
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
-from rigwatch.wire.errors import SessionError
+from rigwatch.wire.errors import BusError, SessionError
 from tests.bus.rig import TestRig
 from tests.monitor_process.model import monitor_section
 
@@ -69,3 +69,22 @@ def test_a_rig_that_cannot_start_keeps_no_file(tmp_path: Path) -> None:
         MonitorProcess(rig.config, rig.path, model, MemoryNetwork().bus("bench", "monitor"))
     assert journal.exists()
     assert journal.resolve() not in open_files()
+
+
+@pytest.mark.parametrize("fails", ["subscribe_own", "announce"])
+def test_a_rig_whose_bus_fails_at_the_start_can_start_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails: str
+) -> None:
+    """A process of several rigs tries again: a lock that was kept would refuse it for ever."""
+    rig = TestRig(tmp_path, monitor_section(tmp_path))
+    model = suitable_model(rig.config, rig.path)
+    network = MemoryNetwork()
+    bus = network.bus("bench", "monitor")
+
+    def broken(*_: object) -> None:
+        raise BusError("the router is gone")
+
+    monkeypatch.setattr(bus, fails, broken)
+    with pytest.raises(BusError):
+        MonitorProcess(rig.config, rig.path, model, bus)
+    MonitorProcess(rig.config, rig.path, model, network.bus("bench", "monitor")).close()

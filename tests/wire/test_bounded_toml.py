@@ -5,7 +5,7 @@ import time
 import pytest
 
 from rigwatch.wire.errors import ConfigError
-from rigwatch.wire.typed_files import Section, loads, parse
+from rigwatch.wire.typed_files import Section, as_toml, loads, parse
 
 
 class Small(Section):
@@ -57,3 +57,8 @@ def test_long_keys_of_digits_and_arrays_of_numbers_are_read() -> None:
     assert read[key] == 1
     assert len(read["b"]) == 2000
     assert read["c"]["d"]["e"] == "x"
+
+
+def test_keys_and_texts_of_any_letters_are_read_back() -> None:
+    tree = {"größe": 'a "b" \\ c', "two words": {"ä": 1}, "plain_one-2": ["\u00e9\n"]}
+    assert loads(as_toml(tree)) == tree

@@ -263,3 +263,23 @@ def test_no_damage_makes_a_command_fall_over(
     except RigwatchError as error:
         one_line = str(error)
         assert "\n" not in one_line, one_line
+
+
+@pytest.mark.parametrize("start", ["1e12", "1e30"])
+def test_a_span_beyond_all_dates_is_refused_in_a_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], start: str
+) -> None:
+    with SessionWriter(tmp_path / "run.mcap", run_info("bench", 256.0, t_ns=T0)) as writer:
+        writer.write(samples(0, 10))
+    words = ["trim", f"{tmp_path / 'run.mcap'}", f"{tmp_path / 'part.mcap'}", "--start", start]
+    assert main(words) == 2
+    assert "found no samples from" in capsys.readouterr().err
+
+
+def test_the_rate_of_a_slow_log_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A sample a day is not one at 0.000 Hz."""
+    log, session = tmp_path / "level.csv", tmp_path / "level.mcap"
+    log.write_text("t,level\n0,1\n86400,2\n172800,3\n")
+    import_file(log, session, ImportMapping(channels={"level": "level[m]"}, time="t[s]"))
+    assert main(["info", f"{session}"]) == 0
+    assert "3 samples at 1.157e-05 Hz, longest step 86400 s" in capsys.readouterr().out

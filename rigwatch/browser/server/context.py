@@ -12,7 +12,7 @@ from starlette.responses import PlainTextResponse, Response
 
 from rigwatch.browser.server.places import PlaceError, Places
 from rigwatch.browser.work import Desk, Desks
-from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.errors import RigwatchError, reason_of
 from rigwatch.wire.typed_files import JsonError, as_json, json_value
 
 MOST_BODY = 1 << 20
@@ -75,6 +75,8 @@ def errors_answered(handler: Handler) -> Handler:
             return answer({"error": str(error)}, 404)
         except RigwatchError as error:
             return answer({"error": str(error)}, 409)
+        except OSError as error:  # a full disk, a folder that may only be read
+            return answer({"error": f"{error.filename or 'files'}: {reason_of(error)}"}, 409)
         except ClientDisconnect:
             return answer({"error": "the request ended before its content"}, 400)
 

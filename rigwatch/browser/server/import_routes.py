@@ -122,7 +122,7 @@ async def take_in(request: Request) -> Response:
     try:
         made = await run_in_threadpool(apart, import_file, source, target, mapping)
     except RigwatchError as error:
-        target.unlink(missing_ok=True)
+        # Nothing is left of it; what stands there another request has brought meanwhile.
         raise ImportDataError(str(error).replace(str(source), source.name)) from None
     _gone(source)
     return answer(

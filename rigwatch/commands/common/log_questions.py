@@ -36,7 +36,12 @@ def ask_for_logs(arguments: argparse.Namespace) -> None:
     from rigwatch.wire.exchange import ImportMapping, read_table
 
     here = sorted(path.name for path in Path().iterdir() if path.suffix in LOGS)
-    logs = shlex.split(_answer("logs of the machine, separated by spaces", shlex.join(here)))
+    answer = _answer("logs of the machine, separated by spaces", shlex.join(here))
+    try:
+        logs = shlex.split(answer)
+    except ValueError as error:
+        said = "expected names such as run1.csv 'run 2.csv', each quotation closed"
+        raise ModelError(f"found {answer!r}, {said}") from error
     if not logs:
         raise ModelError("found no logs, expected files such as run1.csv")
     arguments.data = [Path(log) for log in logs]

@@ -197,8 +197,8 @@ def _say_how_long(recordings: "list[Recording]", scheme: str) -> None:
     lengths = [(len(next(iter(one.channels.values()))), one.sample_rate) for one in recordings]
     seconds, samples = sum(n / rate for n, rate in lengths), sum(n for n, _ in lengths)
     work = TRANSFER_S if scheme == "transfer" else EQUATIONS_S
-    rough = work[0] + work[1] * samples / 1e5
-    say(f"{seconds:.0f} s of recordings: this takes about {rough:.1g} s, more on a busy machine")
+    rough = float(f"{work[0] + work[1] * samples / 1e5:.1g}")
+    say(f"{seconds:.0f} s of recordings: this takes about {rough:g} s, more on a busy machine")
 
 
 def _summary(model: "RigModel", output: Path) -> dict[str, Any]:

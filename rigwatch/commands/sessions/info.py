@@ -74,11 +74,20 @@ def _run_lines(run: "RunInfo | None") -> list[str]:
 
 def _device_lines(device: "DeviceSummary") -> list[str]:
     figures = (
-        f"device {device.name}: {device.samples} samples at {device.rate_hz:.3f} Hz, "
-        f"longest step {device.longest_step_s * 1e3:.3f} ms, {device.boots} start(s), "
+        f"device {device.name}: {device.samples} samples at {_rate(device.rate_hz)}, "
+        f"longest step {_step(device.longest_step_s)}, {device.boots} start(s), "
         f"{device.gaps} gap(s) with {device.missing} samples missing"
     )
     return [figures, *(_channel_line(channel) for channel in device.channels)]
+
+
+def _rate(rate_hz: float) -> str:
+    """A rate; that of a slow log, of a sample a minute or a day, by its first digits."""
+    return f"{rate_hz:.3f} Hz" if rate_hz >= 1 else f"{rate_hz:.4g} Hz"
+
+
+def _step(step_s: float) -> str:
+    return f"{step_s * 1e3:.3f} ms" if step_s < 1 else f"{step_s:.6g} s"
 
 
 def _channel_line(channel: "ChannelSummary") -> str:

@@ -131,8 +131,13 @@ def _is_uniform(times: FloatArray, period: float) -> bool:
 
 
 def _mean_step(steps: FloatArray, median: float) -> float:
-    """Mean of the steps without holes [s]: the median of rounded time stamps is rounded too."""
-    return float(steps[np.abs(steps - median) < 0.5 * median].mean())
+    """Mean of the steps without holes [s]: the median of rounded time stamps is rounded too.
+
+    Where one half of the steps is much longer than the other, none is near their median: the
+    shorter ones count, so that no sample is lost.
+    """
+    usual = steps[np.abs(steps - median) < 0.5 * median]
+    return float(usual.mean() if usual.size else steps[steps < median].mean())
 
 
 def _rounded(rate: float) -> float:

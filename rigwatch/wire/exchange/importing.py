@@ -88,6 +88,7 @@ def _time_base(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[s
     if not mapping.time:
         return _counted(table, mapping)
     source = _source("time", mapping.time, table, mapping)
+    _check_filled("time", source, table)
     written = _in_si("time", source, table, structs.replace(mapping, flag_missing=False))
     columns = [_source(*each, table, mapping).column for each in mapping.channels.items()]
     stamps = increasing(table, source.column, written, columns)
@@ -132,11 +133,21 @@ def _counted(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[str
             f"{table.path}: found neither time nor rate, expected --time 'COLUMN[s]' or --rate HZ;"
             f" its columns are {', '.join(table.names)}"
         )
-    first = _source(*_counting(mapping), table, mapping)
+    channel, text = _counting(mapping)
+    first = _source(channel, text, table, mapping)
+    _check_filled(channel, first, table)
     count = len(table.cells[first.column])
     times = np.arange(count) / mapping.rate
     grid = whole(mapping.rate, times, (0.0, 0.0))
     return _TimeBase(grid, Stamps(times, np.ones(count, bool))), ()
+
+
+def _check_filled(channel: str, source: Source, table: Table) -> None:
+    """Raise if a column has no values: in JSON and MAT files columns differ in length."""
+    if not len(table.cells[source.column]):
+        raise ImportDataError(
+            f"{table.path}: {channel}: found no values in {source.column!r}, expected at least one"
+        )
 
 
 def _in_si(channel: str, source: Source, table: Table, mapping: ImportMapping) -> FloatArray:

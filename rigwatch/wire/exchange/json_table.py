@@ -6,6 +6,7 @@
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -67,4 +68,5 @@ def _numbers(header: Mapping[str, Any], before: str = "") -> Iterator[tuple[str,
         if isinstance(value, dict):
             yield from _numbers(value, f"{before}{name}.")
         elif isinstance(value, int | float) and not isinstance(value, bool):
-            yield before + name, float(value)
+            with suppress(OverflowError):  # a number of hundreds of digits is a name, not a value
+                yield before + name, float(value)

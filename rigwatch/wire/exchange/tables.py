@@ -92,7 +92,7 @@ class Table:
         cells = self.cells[column]
         try:
             values = _in_seconds(np.asarray(cells)).astype(np.float64)
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, OverflowError):
             values = self._numbers_one_by_one(column, cells, allow_missing)
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad) and not allow_missing:

@@ -18,6 +18,8 @@ FLUSH_EVERY = 4096
 """Messages per chunk."""
 _DATED_NS = round(datetime(2000, 1, 1, tzinfo=UTC).timestamp() * 1e9)
 """Earliest Unix time that is a date [ns]; imported logs may begin at zero."""
+_UNDATED_NS = round(datetime(9999, 12, 31, tzinfo=UTC).timestamp() * 1e9)
+"""Unix time from which none is a date [ns]: a year has four digits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +119,7 @@ def iso_time(t_ns: int) -> str:
 
     A log without a date begins at zero, or at the seconds that its logger counts.
     """
-    if t_ns < _DATED_NS:
+    if not _DATED_NS <= t_ns < _UNDATED_NS:
         return f"{t_ns / 1e9:.3f} s"
     whole, rest = divmod(t_ns, 1_000_000_000)
     text = datetime.fromtimestamp(whole, UTC).strftime("%Y-%m-%dT%H:%M:%S")

@@ -7,7 +7,7 @@ from rigwatch.wire.typed_files.json_values import JsonError, as_json, decoded, j
 from rigwatch.wire.typed_files.loading import Section, converted, load, parse, read_text
 from rigwatch.wire.typed_files.overlay import holder, load_layered, whole_text
 from rigwatch.wire.typed_files.shipped import copy_out, find_config, find_file, shipped_names
-from rigwatch.wire.typed_files.writing import as_toml
+from rigwatch.wire.typed_files.writing import as_toml, quoted
 
 __all__ = [
     "JsonError",
@@ -25,6 +25,7 @@ __all__ = [
     "load_layered",
     "loads",
     "parse",
+    "quoted",
     "read_text",
     "shipped_names",
     "whole_text",

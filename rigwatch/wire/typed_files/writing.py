@@ -29,8 +29,14 @@ def _is_table(value: object) -> bool:
     return isinstance(value, dict) or is_many
 
 
+def quoted(text: str) -> str:
+    """A text as TOML, whatever letters it has."""
+    return _value(text)
+
+
 def _key(key: str) -> str:
-    return key if key.replace("_", "").replace("-", "").isalnum() else _value(key)
+    is_bare = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
+    return key if is_bare else _value(key)
 
 
 def _value(value: object) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from rigwatch.physics.engine.equations import Input, Model, Output, check_model, model_named
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.typed_files import quoted
 from rigwatch.wire.units import is_unit, unit_of
 from rigwatch.workbench.data import (
     RATES_ALIKE,
@@ -78,7 +79,7 @@ def _file(files: NewFiles, logs: Logs, model: Model, reading: Matched) -> tuple[
     driving = [n for n in _channels(model.inputs) if n in tables[0].values]
     outputs = [n for n in _channels(model.outputs) if n in tables[0].values]
     train, held_out = proposed_split(tables, driving or outputs, outputs)
-    lines = [f'model = "{_named(files, logs.model)}"']
+    lines = [f"model = {quoted(_named(files, logs.model))}"]
     choices = [f"columns: {_as_read(columns)}"] if columns else []
     rates = [1 / table.dt for table in tables]
     if max(rates) / min(rates) > 1 + RATES_ALIKE:
@@ -170,7 +171,7 @@ def _named(files: NewFiles, model: str) -> str:
 
 
 def _span(use: str, session: str, part: Part, logs: Logs) -> list[str]:
-    lines = ["", f"[[{use}]]", f'session = "{session}.mcap"']
+    lines = ["", f"[[{use}]]", f"session = {quoted(f'{session}.mcap')}"]
     if part.start:
         lines.append(f"start = {part.start:.6g}")
     if part.end != float("inf"):

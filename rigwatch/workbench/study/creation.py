@@ -36,8 +36,8 @@ def start_study(folder: Path, text: str) -> Study:
     """
     check_new(folder)
     folder.mkdir(parents=True, exist_ok=True)
+    write_new(folder / FILE, text)  # refused if another process was faster: the study is its own
     try:
-        write_new(folder / FILE, text)
         study = open_study(folder)
         append(study, "new")
     except BaseException:

@@ -8,11 +8,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.study.folder import FILE
 from rigwatch.workbench.study.own_files import unsaved
 from rigwatch.workbench.study.study import GIVEN, Study, converted, study_of
 from rigwatch.workbench.study.study_file import Accepted
 
 _TABLE = "\n[[effects]]\n"
+_OF_EFFECT = re.compile(r"(?m)^[ \t]*\[\[[ \t]*effects[ \t]*\]\]")
+_OTHER = re.compile(r"(?m)^[ \t]*\[(?!\[?[ \t]*effects[ \t]*[.\]])")
+"""Beginning of a table that is none of an effect, nor a part of one."""
+_REMARKS = re.compile(r"(\n[ \t]*(#[^\n]*)?)*\Z")
+_LIST = r"\[(?:#[^\n]*|\"[^\"\n]*\"|'[^'\n]*'|[^\]\"'#])*\][^\n]*\n?"
+"""A list of texts, on one line or on several."""
 CHOSEN = "  # chosen from the data, with the first effect"
 """Comment on lines that are written with the first effect and removed with it."""
 
@@ -39,16 +46,29 @@ def drop_effect(study: Study) -> Study:
     """The study without the last effect in its file.
 
     Raises:
-        ModelError: there is no effect, or its table is not at the end of the file.
+        ModelError: there is no effect, or it has no table of its own.
     """
-    text = study.text
-    at = text.rfind(_TABLE)
-    if not study.file.effects or at < 0:
+    if not study.file.effects:
         raise ModelError(f"{study.folder}: found no effect to undo")
-    text = text[:at].rstrip() + "\n"
+    text = _without_last_table(study.text)
     if len(study.file.effects) == 1:
         text = "".join(line for line in text.splitlines(True) if CHOSEN not in line)
-    return study_of(study.folder, text)
+    changed, kept = study_of(study.folder, text), study.file.effects[:-1]
+    if [(a.effect, a.port) for a in changed.file.effects] != [(a.effect, a.port) for a in kept]:
+        expected = "each effect in a table [[effects]] of its own"
+        raise ModelError(f"{study.folder / FILE}: found effects written otherwise, {expected}")
+    return changed
+
+
+def _without_last_table(text: str) -> str:
+    """The text without its last table of an effect; what a user wrote behind it stays."""
+    begin = next((found.start() for found in [*_OF_EFFECT.finditer(text)][::-1]), len(text))
+    other = _OTHER.search(text, begin)
+    table = text[begin : other.start() if other else len(text)]
+    remarks = _REMARKS.search(table)
+    assert remarks is not None  # at the end of any text there may be none
+    behind = table[remarks.start() :] + text[begin + len(table) :]
+    return "\n\n".join(filter(None, (text[:begin].rstrip(), behind.strip()))) + "\n"
 
 
 def use_effect_file(study: Study, name: str, text: str) -> Study:
@@ -97,8 +117,8 @@ def use_variants(study: Study, variants: Sequence[str]) -> Study:
 def _with_list(study: Study, key: str, names: Sequence[str]) -> str:
     """The file's text with a list of names at its top; without the key if the list is empty."""
     quoted = ", ".join(f'"{name}"' for name in names)
-    kept = [x for x in study.text.splitlines(True) if not re.match(rf"{key}\s*=", x)]
-    return "".join([f"{key} = [{quoted}]\n" if names else "", *kept])
+    kept = re.sub(rf"(?m)^[ \t]*{key}[ \t]*=[ \t]*{_LIST}", "", study.text)
+    return (f"{key} = [{quoted}]\n" if names else "") + kept
 
 
 def keep_holds(study: Study) -> Study:

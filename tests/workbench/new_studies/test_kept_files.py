@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from rigwatch.commands import main
+from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data.signals import prepare
 from rigwatch.workbench.steps import from_logs
+from rigwatch.workbench.steps.new_files import NewFiles
 from rigwatch.workbench.study.study import open_study
 from tests.workbench.machine import recorded
 
@@ -108,3 +110,22 @@ def test_the_ledger_of_an_earlier_study_is_not_continued(tmp_path, model, capsys
 def test_a_log_that_is_not_there_is_named(tmp_path, model, capsys):
     assert new(tmp_path / "study", tmp_path / "run.mcap", model) == 2
     assert "run.mcap: found no such file" in capsys.readouterr().err
+
+
+def test_a_log_may_have_any_name(tmp_path, model):
+    log = session(tmp_path / "logs" / 'run "ä" 1.mcap')
+    assert new(tmp_path / "study", log, model) == 0
+    assert {span.session for span in open_study(tmp_path / "study").file.train} == {log.name}
+
+
+def test_two_that_make_one_study_at_once_do_not_remove_each_others_files(tmp_path):
+    folder = tmp_path / "study"
+    with NewFiles(folder) as first:
+        first.to_write("run.mcap").write_text("of the first")
+        refused = pytest.raises(ModelError, match="another process that makes a study there")
+        with refused, NewFiles(folder) as second:
+            second.to_write("other.mcap")
+    assert (folder / "run.mcap").read_text() == "of the first"
+    with pytest.raises(ModelError, match="exists already"), NewFiles(folder) as third:
+        third.to_write("run.mcap")
+    assert (folder / "run.mcap").read_text() == "of the first"

@@ -1,5 +1,7 @@
 """`rigwatch study new` without logs asks for them at a terminal, and refuses without one."""
 
+import argparse
+import io
 import os
 import pty
 import subprocess
@@ -10,7 +12,9 @@ from pathlib import Path
 import pytest
 
 from rigwatch.commands import main
+from rigwatch.commands.common import ask_for_logs
 from rigwatch.physics.engine.equations import shipped_models
+from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.steps import suggested
 from rigwatch.workbench.study.study import open_study
 from sim_plant.machines import MACHINES, log
@@ -82,3 +86,12 @@ def test_only_what_a_header_tells_is_suggested() -> None:
     both = {"voltage": "Motor voltage [V][V]", "speed": "Speed [rpm][rpm]"}
     assert suggested(columns, motor) == both
     assert suggested([*columns[:2], "Speed [ticks]"], motor) == {"voltage": both["voltage"]}
+
+
+def test_a_quotation_that_is_not_closed_is_refused_in_a_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "stdin", io.StringIO("John's log.csv\n"))
+    with pytest.raises(ModelError, match=r"John's log\.csv.*, expected names such as"):
+        ask_for_logs(argparse.Namespace())
