@@ -2,13 +2,14 @@
 
 Of like parts each causes a share of the error. One effect at one port leaves the shares of the
 others, and a search that adds port by port may turn to something else first. Where no effect is
-named, those that explain most at like ports are therefore put at all of these, one effect after the
-other, and judged as any set is: each has to be supported beside the others. What holds is told with
-the command that adds it; the verdict's word stands. Where each shows at too few changes to be
-determined by itself, one parameter for all of them may be, which only the model's author can know
-to be one.
+named, those that explain most at one of like ports are therefore put at all of them, one effect
+after the other, and judged as any set is: each has to be supported beside the others. What holds is
+told with the command that adds it; the verdict's word stands. Where each shows at too few changes
+to be determined by itself, one parameter for all of them may be, which only the model's author can
+know to be one.
 """
 
+import math
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
@@ -26,7 +27,7 @@ from rigwatch.workbench.study import told
 MOST_PORTS = 4
 """Largest number of like ports; of more, as in a structure, parts seldom change alike."""
 MOST_TRIED = 3
-"""Largest number of effects that are fitted; scores of single ports order them only roughly."""
+"""Largest number of effects that are put at all of their like ports."""
 BY_CHANCE = 0.05
 """Probability below which an effect's score at one of the ports is more than chance."""
 SAID = (
@@ -88,18 +89,19 @@ def _unit(model: Model, port: Port) -> str:
 
 
 def _most_alike(model: Model, rows: Sequence[Ranked]) -> list[list[Ranked]]:
-    """Effects that explain most at like ports, each at all of them, the largest share first.
+    """Effects that explain most at one of like ports, each at all of them.
 
-    Of effects that look alike at the port where one shows most, one that acts in continuous time is
-    taken before one that acts on samples, and then the one with the fewest parameters.
+    A fit at one port orders them, and first-order shares where there is none. Of effects that look
+    alike at the port where one shows most, one that acts in continuous time is taken before one
+    that acts on samples, and then the one with the fewest parameters.
     """
     left = [each for ports in like_ports(model) for each in _at_each(ports, rows)]
     chosen: list[list[Ranked]] = []
     while left and len(chosen) < MOST_TRIED:
-        most = max(left, key=_explained)
+        most = min(left, key=lambda each: _rank_of(each[0]))
         similar = [each for each in left if each is most or _resembles(each, most)]
         chosen.append(min(similar, key=lambda each: (
-            each[0].placement.effect.sampled, each[0].free, -_explained(each)
+            each[0].placement.effect.sampled, each[0].free, _rank_of(each[0])
         )))  # fmt: skip
         left = [each for each in left if each not in similar]
     return chosen
@@ -113,7 +115,7 @@ def _at_each(ports: Sequence[str], rows: Sequence[Ranked]) -> list[list[Ranked]]
             found[row.effect].append(row)
     whole = [each for each in found.values() if {row.port for row in each} == set(ports)]
     shown = [each for each in whole if min(row.p_value for row in each) < BY_CHANCE]
-    return [sorted(each, key=lambda row: -row.explained) for each in shown]
+    return [sorted(each, key=_rank_of) for each in shown]
 
 
 def _resembles(one: Sequence[Ranked], other: Sequence[Ranked]) -> bool:
@@ -122,8 +124,9 @@ def _resembles(one: Sequence[Ranked], other: Sequence[Ranked]) -> bool:
     return same and other[0].cosines.get(one[0].label, 0.0) > ALIKE
 
 
-def _explained(rows: Sequence[Ranked]) -> float:
-    return sum(row.explained for row in rows)
+def _rank_of(row: Ranked) -> tuple[float, float]:
+    """Training error with the effect at its port, then what it explains to first order."""
+    return (row.fitted.train_error if row.fitted else math.inf, -row.explained)
 
 
 def _text(bench: Bench, alike: Sequence[Ranked], gain: SetGain) -> str:
