@@ -86,8 +86,6 @@ signal = "t2"
 UNITS = {"q1": "W", "q2": "W", "t1": "K", "t2": "K"}
 STEP = 4.0
 SAMPLES = 250
-
-
 # Each heater is switched a few times, one after the other, as in a lesson on step responses.
 STEPS = (0, 5, 25, 75, 125, 150, 175, 225)
 LOG = ((0, 0), (2.4, 0), (2.4, 1), (0.6, 2.85), (0.6, 0.75), (2.1, 0.75), (2.1, 3.0), (1.5, 3.0))
