@@ -43,6 +43,7 @@ from rigwatch.workbench.explain.rough_verdict import (
     undetermined_if_little_and_unexplained,
     undetermined_if_much_left,
 )
+from rigwatch.workbench.explain.sets.like_ports import with_like_ports
 from rigwatch.workbench.explain.sets.pairs import two_effects
 from rigwatch.workbench.explain.sets.several_effects import may_need_several, several_effects
 from rigwatch.workbench.explain.verdict import Verdict, not_converged
@@ -290,6 +291,7 @@ def _judged(bench: Bench, rows: list[Ranked], progress: Progress) -> tuple[list[
         verdict = _by_pairs(bench, rows, verdict, progress)
     elif may_need_several(bench, verdict):
         verdict = several_effects(bench, rows, verdict, progress)
+        verdict = with_like_ports(bench, rows, verdict, progress)
     verdict = unless_refused(refused, with_motion_sensor(bench, verdict))
     verdict = unless_resampled(bench, verdict)
     if along and bench.study.model.rough:

@@ -25,6 +25,8 @@ class SetGain:
         others: the other effects of the set.
         without, held_out_error: of the model with the others, and with the whole set.
         reason: why the set does not support the effect; empty if it does.
+        vague: whether that is only because the training does not determine the strengths, while the
+            held-out error falls with each effect and with all.
     """
 
     label: str
@@ -32,6 +34,7 @@ class SetGain:
     without: float
     held_out_error: float
     reason: str
+    vague: bool = False
 
     def text(self, unit: str) -> str:
         """The evidence in a sentence, in the unit in which errors are told."""
@@ -51,21 +54,24 @@ def set_gain(bench: Bench, label: str, others: Sequence[str]) -> SetGain:
         ModelError: an effect does not fit its port, or a set cannot be fitted.
     """
     whole = _fitted_set(bench, [label, *others])
-    errors, reasons = {}, list[str]()
+    errors, reasons, vague = {}, list[str](), True
     for each in whole:
         rest = _fitted_set(bench, [row.label for row in whole if row is not each])
-        judged = replace(each, fitted=whole[-1].fitted)
+        judged = replace(each, fitted=whole[-1].fitted, vague=False)
         judge_fit(_last(rest), judged)
         errors[each.label] = _last(rest).held_out_error
+        vague = vague and (judged.accepted or judged.vague)
         if not judged.accepted:
             names = ", ".join(sorted(row.label for row in rest))
             reasons.append(f"{each.label} with {names}: {judged.reason}")
-    judged = replace(whole[0], fitted=whole[-1].fitted)
+    judged = replace(whole[0], fitted=whole[-1].fitted, vague=False)
     judge_fit(bench.base, judged)
+    vague = vague and (judged.accepted or judged.vague)
     if not judged.accepted:
         reasons.append(f"all together: {judged.reason}")
     found = _last(whole).held_out_error
-    return SetGain(label, tuple(others), errors[label], found, "; ".join(reasons[:1]))
+    why = "; ".join(reasons[:1])
+    return SetGain(label, tuple(others), errors[label], found, why, bool(why) and vague)
 
 
 def _last(rows: Sequence[Ranked]) -> Fitted:
