@@ -30,8 +30,8 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import part
 
 PUSHES = 2.0
-"""Standard deviations by which dry friction is larger beside what is mispredicted of the changed
-motion than alone, above which the latter pushes.
+"""Standard deviations by which dry friction beside what is mispredicted of the changed motion exceeds
+dry friction alone, above which the latter acts as negative damping.
 """
 OFTEN = 3
 """Reversals in the longest window that tell dry friction from what is mispredicted."""
@@ -80,10 +80,10 @@ def force_of_changed_motion(alone: float, spread: float, slow: float, kept: Deci
     """The force that is told once friction has acted throughout the longest window [N].
 
     Friction changes the motion, and what the equations mispredict of the change is like damping, of
-    either sign, and like mass. Damping that pushes, which no friction does, would make dry friction
-    alone appear smaller: the force beside both is told. Damping that hinders may as well be what
+    either sign, and like mass. Negative damping, which no friction is, makes dry friction alone
+    appear smaller: then the force beside both is told. Positive damping may as well be what
     smoothing and presliding round off. Only reversals tell dry friction from either. What is not
-    known of the inputs' lateness repeats with the motion, and may at worst all look like the
+    known of the inputs' lateness repeats with the motion, and at worst all of it looks like the
     difference.
 
     Args:
