@@ -30,8 +30,8 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import part
 
 PUSHES = 2.0
-"""Standard deviations by which dry friction beside what is mispredicted of the changed motion exceeds
-dry friction alone, above which the latter acts as negative damping.
+"""Standard deviations by which dry friction beside what is mispredicted of the changed motion
+exceeds dry friction alone, above which the latter acts as negative damping.
 """
 OFTEN = 3
 """Reversals in the longest window that tell dry friction from what is mispredicted."""
