@@ -16,9 +16,9 @@ from monitor.signals import DEAD, GOOD, NEW_BOOT, RESTART, Codes
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel, part
 
-DELAY, MATCHED, STEPPED = -1, -2, -3
-"""Codes of columns that are only delayed, smoothed like one that is differentiated twice, or half
-the change from the sample before to the sample after.
+DELAY, MATCHED, STEPPED, STEPPED_BEFORE = -1, -2, -3, -4
+"""Codes of columns that are only delayed, smoothed like one that is differentiated twice, half the
+change from the sample before to the sample after, or the change from the sample before.
 """
 
 
@@ -82,6 +82,8 @@ def motion_kernel(order: int, half_width: int, rate: float, late: float = 0.0) -
         return np.asarray(np.eye(width)[half_width], np.float64)
     if order == STEPPED:
         return np.asarray(0.5 * (np.eye(width)[half_width + 1] - np.eye(width)[half_width - 1]))
+    if order == STEPPED_BEFORE:
+        return np.asarray(np.eye(width)[half_width] - np.eye(width)[half_width - 1])
     if order == MATCHED:
         # The kernel of the second derivative is a second difference of a smoothing one.
         second = scipy.signal.savgol_coeffs(width, 3, deriv=2, delta=1.0, use="dot")

@@ -4,6 +4,7 @@
     g1 = H[ŷ with one newton of dry friction - ŷ],   g2 = the same for viscous friction
     d  = H[ŷ + w·φ(z) with weaker inputs - ŷ - w·φ(z)]
     s  = H[ŷ + w·φ(z) with inputs late by one sample - ŷ - w·φ(z)]
+    sh = H[ŷ + w·φ(z) with inputs that are held, and late by one sample - ŷ - w·φ(z)]
     l  = H[ŷ + w·φ(z) with the inputs' edges between samples - ŷ - w·φ(z)]
 
 In an integrating plant, small errors of flows accumulate to slow errors of forces. All signals are
@@ -25,12 +26,13 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel, part
 
 COLUMNS = (
-    "residual", "dry", "viscous", "predicted", "disagreement", "measured", "weak", "late", "moved",
+    "residual", "dry", "viscous", "predicted", "disagreement", "measured", "weak", "late",
+    "held_late", "moved",
 )  # fmt: skip
 (
-    E, DRY_UNIT, VISCOUS_UNIT, PREDICTED, DISAGREE, MEASURED, WEAK, LATE_UNIT, MOVED, UNSURE_INPUT,
-    DRY_BARE, JITTERS, JUDGED,
-) = range(13)  # fmt: skip
+    E, DRY_UNIT, VISCOUS_UNIT, PREDICTED, DISAGREE, MEASURED, WEAK, LATE_UNIT, HELD_LATE, MOVED,
+    UNSURE_INPUT, DRY_BARE, JITTERS, JUDGED,
+) = range(14)  # fmt: skip
 """Judged columns: those above, high-passed, s for what is not known of the inputs' instants, g1
 without the high-pass, and whether edges jitter, so that the residual shows their instants; and
 their number.
@@ -93,13 +95,13 @@ class HighPassed:
         changed: FloatArray,
         state: np.ndarray,
     ) -> FloatArray:
-        """High-passed columns, shape (n, 9), from raw columns and the remainder's signals.
+        """High-passed columns, shape (n, 10), from raw columns and the remainder's signals.
 
         Args:
             columns: raw.
             z: signals of the remainder, shape (n, signals).
-            changed: the same with inputs that are weaker, late, and with edges between samples,
-                shape (3, n, signals).
+            changed: the same with inputs that are weaker, late, held and late, and with edges
+                between samples, shape (4, n, signals).
             state: of each row.
         """
         out = np.zeros_like(columns)
@@ -132,7 +134,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
                 value -= remainder
             elif c >= WEAK:
                 value += _remainder(changed[c - WEAK, k], known, scaled) - remainder
-            if c == LATE_UNIT:
+            if c in (LATE_UNIT, HELD_LATE):
                 value /= LATER
             out[k, c] = filter_sample(b, a, kept[c], value)
 

@@ -10,7 +10,15 @@ import numpy as np
 
 from monitor.drives import BANDS, DriveBands, DriveChanges, DriveStops, InputSteps, Steps
 from monitor.model import EquationsPlant, RemainderSection
-from monitor.observer.lagged_motion import DELAY, EMPTY, MATCHED, STEPPED, FixedLag, MotionColumn
+from monitor.observer.lagged_motion import (
+    DELAY,
+    EMPTY,
+    MATCHED,
+    STEPPED,
+    STEPPED_BEFORE,
+    FixedLag,
+    MotionColumn,
+)
 from monitor.observer.missing_force import LATE_UNIT, HighPassed
 from monitor.observer.prediction import (
     AlongMotion,
@@ -32,7 +40,8 @@ class Layout:
     Attributes:
         channels: read from the samples: inputs, then motion, then predicted outputs.
         columns: computed from them: inputs, motion, measured output, the same output derived from
-            the motion, the output with equal smoothing, and the inputs' steps.
+            the motion, the output with equal smoothing, and the inputs' steps around each sample
+            and before it.
         inputs: number of inputs and motions that drive the equations.
         speed: index among them of the speed that friction opposes.
         motions: indices among them of the motion.
@@ -74,7 +83,8 @@ def layout_of(model: Model, port: str) -> Layout:
     balance = balanced_states(model)[0]
     columns.append(MotionColumn(places[balance.channel], balance.order + 1))
     columns.append(MotionColumn(len(channels) - 1, MATCHED if balance.order == 1 else 0))
-    columns += [MotionColumn(place, STEPPED) for place in range(len(inputs))]
+    for order in (STEPPED, STEPPED_BEFORE):
+        columns += [MotionColumn(place, order) for place in range(len(inputs))]
     names = [*model.inputs, *(state.name for state in motion)]
     hidden = [name for name in model.states if name not in names]
     kept, first = sensor_states(model), len(motion)
@@ -100,7 +110,7 @@ class Observed:
         measured: the measured output, shape (n,).
         predicted: the columns of the prediction.
         judged: high-passed columns, see `missing_force`, shape (n, JUDGED); the decision corrects
-            the residual for the inputs' edges, and the response to later inputs for their side.
+            the residual for the inputs' edges, and chooses the response to later inputs.
         steady: False where an input changes suddenly, stops, or steps between samples at a place
             that is not known yet, shape (n,).
         drive: pace of the first input, see `monitor.drives.Drive`, shape (n,).
@@ -217,20 +227,21 @@ class ObserverSignals:
         rows, measured = columns[:, :inputs], columns[:, inputs]
         disagreement = columns[:, inputs + 2] - columns[:, inputs + 1]
         predicted = self._along.update(
-            rows, columns[:, inputs + 3 :], steps.moved, state, steps.moves
+            rows, np.array(np.hsplit(columns[:, inputs + 3 :], 2)), steps.moved, state, steps.moves
         )
         raw = np.column_stack(
             [
                 measured - predicted.output, predicted.dry, predicted.viscous, predicted.output,
                 disagreement, measured, predicted.weak - predicted.output,
-                predicted.late - predicted.output, predicted.moved - predicted.output,
+                predicted.late - predicted.output, predicted.held_late - predicted.output,
+                predicted.moved - predicted.output,
             ]
         )  # fmt: skip
         z, *changed = (
             remainder_signals(rows, hidden, self.layout)
             for hidden in (
                 predicted.hidden, predicted.weak_hidden, predicted.late_hidden,
-                predicted.moved_hidden,
+                predicted.held_late_hidden, predicted.moved_hidden,
             )
         )  # fmt: skip
         judged = self._high_passed.update(raw, z, np.stack(changed), state)

@@ -5,7 +5,8 @@ differences to the plain prediction are the responses of the predicted output to
 of 1 N s/m, including everything in between (an inertia, the sensor's own high-pass). As the motion
 is given, the response is linear in the force. A fourth runs with inputs weaker by `WEAKER`, as of
 a drive that lost gain. A fifth runs with inputs late by `LATER`, which gives the response to inputs
-late by one sample. A sixth runs with the inputs' edges between samples, where they are known to be
+late by one sample, a sixth with inputs that are held and late by `LATER`: they lack steps before
+each sample only. A seventh runs with the inputs' edges between samples, where they are known to be
 regular.
 """
 
@@ -127,8 +128,9 @@ class Predicted:
     """Columns of the prediction, each of shape (n,) or (n, hidden states).
 
     `weak` and `weak_hidden` are output and hidden states with inputs weaker by `WEAKER`, `late` and
-    `late_hidden` those with inputs late by `LATER`, `moved` and `moved_hidden` those with edges
-    between samples; `reset` marks samples at which the states diverged.
+    `late_hidden` those with inputs late by `LATER`, `held_late` and `held_late_hidden` those with
+    inputs that are held as well, `moved` and `moved_hidden` those with edges between samples;
+    `reset` marks samples at which the states diverged.
     """
 
     output: FloatArray
@@ -136,9 +138,11 @@ class Predicted:
     viscous: FloatArray
     weak: FloatArray
     late: FloatArray
+    held_late: FloatArray
     hidden: FloatArray
     weak_hidden: FloatArray
     late_hidden: FloatArray
+    held_late_hidden: FloatArray
     moved: FloatArray
     moved_hidden: FloatArray
     reset: BoolArray
@@ -163,11 +167,11 @@ class AlongMotion:
         values = dict(zip(plant.names, plant.values, strict=True))
         healthy = values | {strengths[0]: plant.coulomb, strengths[1]: 0.0}
         cases = [healthy, *(healthy | {name: healthy[name] + 1.0} for name in strengths)]
-        self._parameters = [self._compiled.vector(case) for case in (*cases, *[healthy] * 3)]
+        self._parameters = [self._compiled.vector(case) for case in (*cases, *[healthy] * 4)]
         self._states = [np.zeros(0)] * len(self._parameters)
         self._usual: FloatArray | None = None
         self._slow = plant.turn
-        self._last = np.zeros((4, 0))
+        self._last = np.zeros((5, 0))
         self._pause = -1
 
     def follow(self, usual: FloatArray | None) -> None:
@@ -186,25 +190,28 @@ class AlongMotion:
 
         Args:
             rows: inputs, then motion.
-            steps: changes of the inputs per sample, shape (n, inputs other than motion).
-            moved: what their means gain by edges between samples, of the same shape.
+            steps: changes of the inputs per sample, around each and before it, shape
+                (2, n, inputs other than motion).
+            moved: what their means gain by edges between samples, of the shape of either.
             state: of each row; changed where the states diverge: the rows of a pause count as
                 without a kernel, and the one after it as the first.
             moves: whether that is known, shape (n,).
         """
         n = len(rows)
         self._wait(state)
-        weaker, later = rows.copy(), rows.copy()
-        weaker[:, : steps.shape[1]] *= 1.0 - WEAKER
-        later[:, : steps.shape[1]] -= LATER * steps
+        weaker, later, held = rows.copy(), rows.copy(), rows.copy()
+        inputs = moved.shape[1]
+        weaker[:, :inputs] *= 1.0 - WEAKER
+        later[:, :inputs] -= LATER * steps[0]
+        held[:, :inputs] -= LATER * steps[1]
         between = rows.copy()
-        between[:, : moved.shape[1]] += moved
-        output, dry, viscous, weak, late, edged = np.zeros((6, n))
-        hidden, weak_hidden, late_hidden, edged_hidden = np.zeros((4, n, self.hidden))
+        between[:, :inputs] += moved
+        output, dry, viscous, weak, late, held_late, edged = np.zeros((7, n))
+        hidden, weak_hidden, late_hidden, held_hidden, edged_hidden = np.zeros((5, n, self.hidden))
         reset = np.zeros(n, np.bool_)
         out = Predicted(
-            output, dry, viscous, weak, late, hidden, weak_hidden, late_hidden, edged, edged_hidden,
-            reset,
+            output, dry, viscous, weak, late, held_late, hidden, weak_hidden, late_hidden,
+            held_hidden, edged, edged_hidden, reset,
         )  # fmt: skip
         begin = 0
         while begin < n:
@@ -212,9 +219,9 @@ class AlongMotion:
                 begin += 1
                 continue
             if state[begin] == FIRST:
-                self._begin(rows[begin], steps[begin])
+                self._begin(rows[begin], steps[0, begin])
             end = _end(state, moves, begin)
-            given = [each[begin:end] for each in (rows, weaker, later, between)]
+            given = [each[begin:end] for each in (rows, weaker, later, held, between)]
             begin += self._run(given, bool(moves[begin]), begin, out)
             if reset[begin - 1]:
                 self._pause = PAUSE
@@ -239,7 +246,7 @@ class AlongMotion:
         begin with the acceleration that a lasting crest causes, and forget it only with the
         sensor's corner.
         """
-        self._last = np.stack([row] * 4)
+        self._last = np.stack([row] * 5)
         moves = np.abs(row[self._rates]).max(initial=0.0) > self._slow or np.any(steps)
         if self._usual is not None and moves:
             self._states = [self._usual] * len(self._parameters)
@@ -253,15 +260,15 @@ class AlongMotion:
         """Run along the rows until they end or diverge; returns the number done.
 
         Args:
-            rows: as they are, weaker, late, and with edges between samples.
+            rows: as they are, weaker, late, held and late, and with edges between samples.
             moves: whether the last differ from the first.
             first: index of the first row.
             out: to be filled.
         """
-        plain, weaker, shifted, between = (
+        plain, weaker, shifted, held, between = (
             np.concatenate([last[None, :], own]) for last, own in zip(self._last, rows, strict=True)
         )
-        given = [plain] * (len(self._parameters) - 3) + [weaker, shifted]
+        given = [plain] * (len(self._parameters) - 4) + [weaker, shifted, held]
         made = [self._simulated(case, own) for case, own in enumerate(given)]
         made.append(self._simulated(len(given), between) if moves else made[0])
         outputs = np.stack([one.outputs[0, 1:] for one in made])
@@ -277,7 +284,8 @@ class AlongMotion:
         out.viscous[at] = outputs[2, :, 0] - outputs[0, :, 0]
         out.weak[at], out.weak_hidden[at] = outputs[3, :, 0], outputs[3, :, 1:]
         out.late[at], out.late_hidden[at] = outputs[4, :, 0], outputs[4, :, 1:]
-        out.moved[at], out.moved_hidden[at] = outputs[5, :, 0], outputs[5, :, 1:]
+        out.held_late[at], out.held_late_hidden[at] = outputs[5, :, 0], outputs[5, :, 1:]
+        out.moved[at], out.moved_hidden[at] = outputs[6, :, 0], outputs[6, :, 1:]
         if good:
             return kept
         out.reset[first + kept] = True

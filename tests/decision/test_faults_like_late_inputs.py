@@ -16,7 +16,15 @@ from monitor.observer import (
 )
 from monitor.observer import decision_state as d
 from monitor.observer.lagged_motion import FIRST, WHOLE
-from monitor.observer.missing_force import DRY_BARE, DRY_UNIT, JUDGED, LATE_UNIT, VISCOUS_UNIT, E
+from monitor.observer.missing_force import (
+    DRY_BARE,
+    DRY_UNIT,
+    HELD_LATE,
+    JUDGED,
+    LATE_UNIT,
+    VISCOUS_UNIT,
+    E,
+)
 from rigwatch.wire.arrays import FloatArray
 
 RATE, N, SLOW, NOISE = 256.0, 3072, 1e-3, 0.05
@@ -107,7 +115,7 @@ def decided(late: float, off: float, friction: float = 0.0) -> FloatArray:
         friction: as what it leaves of the residual.
     """
     judged, speed = np.zeros((N, JUDGED)), np.sin(PHASE + 0.1)
-    judged[:, LATE_UNIT] = 0.5 * np.cos(PHASE)
+    judged[:, LATE_UNIT] = judged[:, HELD_LATE] = 0.5 * np.cos(PHASE)
     judged[:, DRY_UNIT] = judged[:, DRY_BARE] = -np.sign(speed)
     judged[:, VISCOUS_UNIT] = -speed
     judged[:, E] = NOISE * np.random.default_rng(1).standard_normal(N) + late * judged[:, LATE_UNIT]

@@ -18,7 +18,7 @@ from monitor.observer import (
 )
 from monitor.observer import decision_state as d
 from monitor.observer.lagged_motion import FIRST, WHOLE
-from monitor.observer.missing_force import JUDGED, LATE_UNIT
+from monitor.observer.missing_force import HELD_LATE, JUDGED, LATE_UNIT
 from monitor.signals import GOOD, NEW_BOOT
 from tests.monitor.observed_rig import RATE, SINE, UNITS, model, run
 
@@ -90,7 +90,7 @@ def test_a_new_residual_at_a_motion_that_is_known_is_a_departure_at_once(
     judged, levels, zeros = np.zeros((n, JUDGED)), np.zeros((n, 1)), np.zeros(n, np.bool_)
     judged[:, E] = 0.03 * np.random.default_rng(1).standard_normal(n)
     judged[begin:, E] += size
-    judged[begin:, LATE_UNIT] = size * late
+    judged[begin:, LATE_UNIT] = judged[begin:, HELD_LATE] = size * late
     state = np.full(n, WHOLE)
     state[0] = FIRST
     out = np.zeros((len(d.OUTPUTS), n))

@@ -54,7 +54,7 @@ from monitor.observer.decision.naming import follow_episode, name_unrecorded
 from monitor.observer.decision.window_statistics import SEEN
 from monitor.observer.lagged_motion import EMPTY, FIRST, TAINTED
 from monitor.observer.lateness import TAU, forget_lateness, response_to
-from monitor.observer.missing_force import DRY_BARE, LATE_UNIT, MOVED, UNSURE_INPUT
+from monitor.observer.missing_force import DRY_BARE, HELD_LATE, LATE_UNIT, MOVED, UNSURE_INPUT
 from monitor.signals import Codes, fill
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel, part
@@ -90,7 +90,8 @@ def decide(  # noqa: PLR0917 -- a kernel
             _restart(kept)
         _follow_drive(drive[k], steady[k], kept)
         kept.counts[GAP_AGO] = 0 if state[k] == TAINTED else kept.counts[GAP_AGO] + 1
-        judged[k, LATE_UNIT] = response_to(judged[k, LATE_UNIT], kept.lateness)
+        both, before = judged[k, LATE_UNIT], judged[k, HELD_LATE]
+        judged[k, LATE_UNIT] = response_to(both, before, kept.lateness)
         if state[k] != TAINTED:
             follow_inputs(kept, judged[k], usual[:, k], altered[k], rules)
             _remember(kept, judged[k], speed[k], levels[k])

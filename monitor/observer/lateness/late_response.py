@@ -1,10 +1,12 @@
 """The response to inputs that act late, and how accurate it is.
 
 An input that is held and late by a part of a sample gains, of the steps on both sides of that, only
-the one before. The response to the mean of both is therefore half a sample too early: at 8 Hz and
-256 Hz it would be wrong by a tenth, of which much looks like friction. (One that is early gains the
-step after, whose response is not known yet.) What it is wrong by besides, as equations fitted to
-one lateness are at another, is found from what a constant lateness leaves.
+the one before. The response to the mean of both is half a sample too early: at 8 Hz and 256 Hz it
+would be wrong by a tenth, of which much looks like friction; and it divides each edge of a square
+wave between two samples, where it explains hardly half of what such inputs leave. One that is early
+gains the step after, or less of the one before if it was late when commissioned: its response stays
+that to both. What it is wrong by besides, as equations fitted to one lateness are at another, is
+found from what a constant lateness leaves.
 """
 
 # Compiled functions are untyped to mypy.
@@ -14,10 +16,11 @@ import numpy as np
 
 from monitor.observer.lateness.lateness_state import (
     ALLOWED,
-    LAST,
     LEAVES,
+    OF_SLOW,
     REFUTED,
     TAU,
+    best,
     is_late,
 )
 from monitor.observer.missing_force import LATE_UNIT, E
@@ -39,15 +42,16 @@ SAFE = 2.0
 
 
 @part()
-def response_to(both: float, kept: FloatArray) -> float:
-    """The response to inputs that are late; to the steps on both sides if they are not known to be.
+def response_to(both: float, before: float, kept: FloatArray) -> float:
+    """The response to inputs that act later; to the steps on both sides if they seem to be early.
 
     Args:
         both: that to the steps on both sides of the sample, for a lateness of one sample.
+        before: that to the step before it.
         kept: the carried figures.
     """
-    before, kept[LAST] = kept[LAST], both
-    return 0.5 * (before + both) if kept[TAU] > 0.0 else both
+    late = kept[TAU] > 0.0 or (kept[TAU] == 0.0 and best(kept, OF_SLOW) > 0.0)
+    return before if late else both
 
 
 @part()

@@ -33,13 +33,13 @@ ERRORS, PRODUCTS, RESPONSES, RUBBED, FRICTIONS, SHARED = range(6)
 OF_QUICK, OF_SLOW = 0, 6
 """Where the means with both memories begin."""
 (
-    TAU, FOR, AGO, COMPARED, DENIED, LAST, SAME, AT_FIRST, LEAVES, ALLOWED, REFUTED, FIGURES,
-) = range(12, 24)  # fmt: skip
+    TAU, FOR, AGO, COMPARED, DENIED, SAME, AT_FIRST, LEAVES, ALLOWED, REFUTED, FIGURES,
+) = range(12, 23)  # fmt: skip
 """Further figures: τ, the time for which it has mattered, the time since it did, `RECENT` if never,
-that for which the motion could be compared, and whether it is another one; the response at the
-sample before; the time for which the lateness has been the same, and the first that was; of a
-constant one means of the energy that it leaves beyond the usual one and of that which is allowed
-for, and the share of the latter that is not there; and the number of figures.
+that for which the motion could be compared, and whether it is another one; the time for which the
+lateness has been the same, and the first that was; of a constant one means of the energy that it
+leaves beyond the usual one and of that which is allowed for, and the share of the latter that is
+not there; and the number of figures.
 """
 
 
