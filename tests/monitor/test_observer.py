@@ -60,7 +60,7 @@ def test_a_drive_that_acts_later_is_remarked_on_with_its_lateness() -> None:
     remark = next(each for each in found.announcements if each.name == "drive_late")
     assert remark.severity == "info"
     assert remark.value == pytest.approx(0.6, abs=0.1)
-    assert remark.cause.endswith("+0.6 samples")
+    assert remark.cause.endswith(f": {remark.value:+.2g} samples")
 
 
 def jittering(voltage: np.ndarray) -> np.ndarray:
