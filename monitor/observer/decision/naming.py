@@ -128,16 +128,15 @@ def _verdict(
     fits = share > FITS and dry > DRY_PART and force > 0.0 and beside > least * force
     drive = drive_explains(kept, length, spread)
     fits = fits and 1.0 - share < OUTDONE * max(1.0 - drive, NOISE)
-    turned = reversals(kept, length, rules.speed_noise) > 0
+    turns = reversals(kept, length, rules.speed_noise)
     still = rest(kept, length, rules.speed_noise)
     sticks = since >= LONG // 2 and still > AT_REST and out[DEPARTED, k] > 0.0
-    agrees = since >= LEAST_LOOK and ((fits and turned) or sticks)
+    agrees = since >= LEAST_LOOK and ((fits and turns > 0) or sticks)
     count[AGREED] = count[AGREED] + 1 if agrees and count[DISAGREED] == 0 else 0
     if fits:
         kept.value[1] = acting
         if since >= LONG:
-            slow = rules.speed_noise
-            kept.value[1] = force_of_changed_motion(acting, spread, slow, kept)
+            kept.value[1] = force_of_changed_motion(acting, spread, turns, kept)
     if count[AGREED] >= LOOKS or before in (FRICTION, STICKING):
         return STICKING if still > STUCK or before == STICKING else FRICTION
     return OTHER if since > rules.patience else UNNAMED

@@ -20,7 +20,6 @@ from monitor.observer.decision.decision_state import (
 from monitor.observer.decision.deviation import late_variance
 from monitor.observer.decision.window_statistics import (
     RIDGE,
-    reversals,
     slides,
     slides_on,
     solved,
@@ -76,7 +75,7 @@ def dry_force(
 
 
 @part()
-def force_of_changed_motion(alone: float, spread: float, slow: float, kept: DecisionState) -> float:
+def force_of_changed_motion(alone: float, spread: float, turns: int, kept: DecisionState) -> float:
     """The force that is told once friction has acted throughout the longest window [N].
 
     Friction changes the motion, and what the equations mispredict of the change is like damping, of
@@ -89,10 +88,10 @@ def force_of_changed_motion(alone: float, spread: float, slow: float, kept: Deci
     Args:
         alone: force of dry friction alone [N].
         spread: what a healthy rig leaves, as a standard deviation.
-        slow: speed that cannot be distinguished from rest.
+        turns: reversals in the longest window.
         kept: the state.
     """
-    if reversals(kept, LONG, slow) < OFTEN:
+    if turns < OFTEN:
         return alone
     beside, left, used = _beside_change(kept, LONG)
     unsure = PUSHES * spread + np.sqrt(used * late_variance(kept))

@@ -7,14 +7,13 @@ just before the token appears, and answers whoever asks for it later.
 
 from rigwatch.wire.bus.tokens.early_messages import EarlyMessages
 from rigwatch.wire.bus.tokens.holding import SLOTS, NamedToken
-from rigwatch.wire.bus.tokens.names import Named, sender_named
+from rigwatch.wire.bus.tokens.names import sender_named
 from rigwatch.wire.bus.tokens.watching import Changed, NamedTokens
 
 __all__ = [
     "SLOTS",
     "Changed",
     "EarlyMessages",
-    "Named",
     "NamedToken",
     "NamedTokens",
     "sender_named",
