@@ -5,7 +5,8 @@ healthy motion nearly as well as the right ones: the motion follows from the dri
 response to the motion is made up for by a wrong response to the drive. A force that changes the
 motion is then found by half. Where the equations leave more than the sensor's noise, each variant
 of the model is therefore fitted briefly from the same values, and the best to its end. It is taken
-if it leaves less of what follows the fitted parts of the recordings.
+if it leaves less of what follows the fitted parts of the recordings. Variants of the sensors are
+not tried: fitted with the plant, a sensor absorbs what the laws of the plant lack.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -40,7 +41,7 @@ def fit_with_variants(
     for _ in range(ROUNDS):
         if not best.later > AT_NOISE:
             break
-        further = [each for each in neighbours(model, names) if _has(model, each, data.known)]
+        further = [each for each in neighbours(model, names) if _suits(model, each, data.known)]
         if not further:
             break
         say(f"the equations leave {best.later:.2f} times the noise: trying {len(further)} variants")
@@ -51,9 +52,10 @@ def fit_with_variants(
     return names, best
 
 
-def _has(model: Model, names: Sequence[str], known: Mapping[str, float]) -> bool:
-    """Whether the model with these variants has all known parameters."""
-    return set(known) <= set(with_variants(model, names).parameters)
+def _suits(model: Model, names: Sequence[str], known: Mapping[str, float]) -> bool:
+    """Whether the model with these variants has all known parameters, and its own sensors."""
+    changed = with_variants(model, names)
+    return set(known) <= set(changed.parameters) and changed.outputs == model.outputs
 
 
 def _best_of(
