@@ -37,7 +37,8 @@ def fit_with_variants(
     Raises:
         ModelError: the model itself cannot be fitted.
     """
-    names, best = (), fit_healthy(model, data)
+    names: tuple[str, ...] = ()
+    best = fit_healthy(model, data)
     for _ in range(ROUNDS):
         if not best.later > AT_NOISE:
             break
