@@ -105,6 +105,27 @@ def test_nothing_is_missing_where_the_error_is_noise() -> None:
 
 
 @pytest.mark.parametrize(
+    ("after", "p_value", "told"),
+    [
+        pytest.param(1.0, 1e-9, True, id="trains"),
+        pytest.param(1.09, 1e-9, False, id="hardly trains"),
+        pytest.param(1.0, 0.01, False, id="by chance"),
+    ],
+)
+def test_what_only_the_training_asks_for_is_told_where_nothing_held_out_is_missing(
+    after: float, p_value: float, told: bool
+) -> None:
+    refused = row("leakage@tank", 1.1, accepted=False)
+    assert refused.fitted is not None
+    refused.fitted = replace(refused.fitted, train=base(after).train)
+    refused.p_value = p_value
+    found = judge(base(1.1), [refused], PERIODS)
+    assert found.word == "nothing_missing"
+    asked = "but leakage@tank lowers the error of the training from 1.1 to 1 N"
+    assert (asked in found.text) == told
+
+
+@pytest.mark.parametrize(
     ("error", "training", "word"),
     [
         pytest.param(1.15, 1.12, "nothing_missing", id="hardly trains"),
