@@ -22,6 +22,7 @@ from rigwatch.wire.host.one_keeper import Hold, Kept
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
 from rigwatch.wire.host.printer import Printer
 from rigwatch.wire.host.processes import end_process, end_with_parent, last_line
+from rigwatch.wire.host.ready_files import ready_to_read, write_within
 from rigwatch.wire.host.realtime import (
     DAQ,
     MONITOR,
@@ -62,6 +63,7 @@ __all__ = [
     "last_line",
     "prepare_for_real_time",
     "raise_priority",
+    "ready_to_read",
     "replace_file",
     "run_side_by_side",
     "set_at_hangup",
@@ -72,4 +74,5 @@ __all__ = [
     "waits_for_samples",
     "waits_of",
     "write_through",
+    "write_within",
 ]
