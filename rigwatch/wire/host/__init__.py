@@ -9,6 +9,7 @@ from rigwatch.wire.host.few_pools import (
     tidy_memory,
     use_few_pools,
 )
+from rigwatch.wire.host.file_presence import may_be_file
 from rigwatch.wire.host.heartbeat import (
     DEVICE_SILENT,
     NO_ROUTER,
@@ -61,6 +62,7 @@ __all__ = [
     "is_free",
     "keep_memory_tidy",
     "last_line",
+    "may_be_file",
     "prepare_for_real_time",
     "raise_priority",
     "ready_to_read",
