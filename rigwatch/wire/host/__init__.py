@@ -2,7 +2,7 @@
 
 from rigwatch.wire.host.both_clocks import both_clocks
 from rigwatch.wire.host.disk_space import free_share
-from rigwatch.wire.host.ending import set_at_hangup, set_at_signal
+from rigwatch.wire.host.ending import set_at_hangup, set_at_signal, unless_ended
 from rigwatch.wire.host.few_pools import (
     keep_memory_tidy,
     settle_memory,
@@ -72,6 +72,7 @@ __all__ = [
     "set_at_signal",
     "settle_memory",
     "tidy_memory",
+    "unless_ended",
     "use_few_pools",
     "waits_for_samples",
     "waits_of",
