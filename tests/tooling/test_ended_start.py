@@ -23,7 +23,7 @@ unless_ended(stop, lambda: time.sleep(600))
 """
 
 
-@pytest.mark.parametrize("process", ["daq", "monitor"])
+@pytest.mark.parametrize("process", ["daq", "monitor", "plant"])
 def test_64_a_process_that_compiles_ends_at_once(process: str, tmp_path: Path) -> None:
     cache = tmp_path / "cache"
     command = [sys.executable, "-m", "rigwatch", process, str(alone(tmp_path))]
