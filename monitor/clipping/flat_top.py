@@ -11,7 +11,8 @@ Page's cumulative sum, one for each end of each channel,
 exceeds h in a healthy channel after at least e^h trials on average (Lorden, Annals of Mathematical
 Statistics 42, 1971). The h is that of every other threshold: e^-h is the probability allowed per
 test. It needs no amplitude, range, period or model. If the converter's step hides the noise, p is
-near 1 and nothing is reported; a channel that does not move at all is stuck, not clipped.
+near 1 and nothing is reported. Repeats count once the signal leaves the extreme: a channel that
+stays there, as one that sticks at a peak, does not move at all and is stuck, not clipped.
 """
 
 # Compiled functions are untyped to mypy.
@@ -41,6 +42,7 @@ class FlatTops(NamedTuple):
 
     Args:
         score: S, shape (c, 2).
+        waiting: what the repeats of the running flat top add to S, shape (c, 2).
         extreme: largest x and largest -x of the running span and of the one before, (2, c, 2).
         last: newest reading, NaN if it was not good, shape (c,).
         filled: samples in the running span, shape (1,).
@@ -48,6 +50,7 @@ class FlatTops(NamedTuple):
     """
 
     score: FloatArray
+    waiting: FloatArray
     extreme: FloatArray
     last: FloatArray
     filled: NDArray[np.int64]
@@ -58,6 +61,7 @@ class FlatTops(NamedTuple):
 def new_flat_tops(channels: int) -> FlatTops:
     """The initial state."""
     state = FlatTops(
+        np.zeros((channels, 2)),
         np.zeros((channels, 2)),
         np.zeros((2, channels, 2)),
         np.zeros(channels),
@@ -73,6 +77,7 @@ def new_flat_tops(channels: int) -> FlatTops:
 def reset_flat_tops(state: FlatTops) -> None:
     """Reset to the initial state; the counts stay."""
     state.score[:, :] = 0.0
+    state.waiting[:, :] = 0.0
     state.extreme[:, :, :] = -np.inf
     state.last[:] = np.nan
     state.filled[0] = 0
@@ -106,6 +111,7 @@ def judge_flat_tops(  # noqa: PLR0917
                 state.last[c] = values[k, c]
             else:
                 state.last[c] = np.nan
+                state.waiting[c, :] = 0.0
             score[k, c] = max(state.score[c, 0], state.score[c, 1])
         state.filled[0] += 1
         if state.filled[0] == SPAN:
@@ -127,8 +133,12 @@ def _trial(  # noqa: PLR0917
         state.repeats[c, end] += 1 if repeats else 0
         if chance < NEVER:
             likely = 0.5 * (1.0 + chance)
-            step = np.log(likely / chance) if repeats else np.log((1 - likely) / (1 - chance))
-            state.score[c, end] = min(max(state.score[c, end] + step, 0.0), _CEILING * limit)
+            if repeats:
+                state.waiting[c, end] += np.log(likely / chance)
+            else:
+                top = min(state.score[c, end] + state.waiting[c, end], _CEILING * limit)
+                state.score[c, end] = max(top + np.log((1 - likely) / (1 - chance)), 0.0)
+                state.waiting[c, end] = 0.0
     state.extreme[0, c, end] = max(state.extreme[0, c, end], side)
 
 

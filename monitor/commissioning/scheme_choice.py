@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from monitor.commissioning.commission import CommissionSettings, commission
 from monitor.commissioning.equations import EQUATIONS, commission_equations
 from monitor.commissioning.steady_signals import CHANNELS
-from monitor.model import RigModel, SchemeSection
+from monitor.model import EquationsPlant, RigModel, SchemeSection
 from monitor.observer import base_model, force_port, layout_of
 from monitor.pipeline import Monitor
 from monitor.signals import DEPARTURE, DRY_FRICTION, OTHER_FAULT, STICTION, Recording
@@ -76,8 +76,10 @@ def commission_best(
             raise ModelError(f"{why}; {error}" if scheme == "auto" else str(error)) from error
         return _with_reason(transfer, f"{why}; {error}")
     assert found.scheme is not None
+    variants = found.plant.variants if isinstance(found.plant, EquationsPlant) else ()
+    used = f"{equations} with {', '.join(variants)}" if variants else equations
     left = (
-        f"equations of {equations}: {found.scheme.held_out:.3g} left of held-out healthy data,"
+        f"equations of {used}: {found.scheme.held_out:.3g} left of held-out healthy data,"
         f" {100 * found.scheme.share:.1f} % of what is measured at worst, whatever the excitation"
     )
     if found.scheme.described_hz:

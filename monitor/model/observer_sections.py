@@ -13,6 +13,9 @@ class EquationsPlant(Section, frozen=True, kw_only=True, tag="equations", tag_fi
     """[plant] kind = "equations": a model of equations, driven along the measured motion."""
 
     model: Annotated[str, Meta(min_length=1, description="name of a shipped model, or its file")]
+    variants: Annotated[
+        tuple[str, ...], Meta(description="variants of it that the healthy rig asks for")
+    ] = ()
     names: Annotated[tuple[str, ...], Meta(description="parameters of the model")]
     values: Annotated[Floats, Meta(description="their fitted values, in the model's units")]
     port: Annotated[str, Meta(description="force port at which friction enters")]

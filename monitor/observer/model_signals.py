@@ -4,7 +4,7 @@ The roles of channels (input, motion, predicted output) follow from the model of
 here is specific to a rig.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,9 +21,12 @@ from monitor.observer.lagged_motion import (
 )
 from monitor.observer.missing_force import LATE_UNIT, HighPassed
 from monitor.observer.prediction import (
+    UNIT_FRICTION,
+    WITH_OTHER_INPUTS,
     AlongMotion,
     Predicted,
-    base_model,
+    Run,
+    equations_of,
     predicted_channel,
     rate_columns,
     speed_state,
@@ -129,12 +132,9 @@ class Observed:
     def part(self, begin: int, end: int) -> "Observed":
         """Samples `begin` to before `end`."""
         at = slice(begin, end)
-        predicted = Predicted(
-            *(getattr(self.predicted, each.name)[at] for each in fields(Predicted))
-        )
         return Observed(
-            self.state[at], self.rows[at], self.measured[at], predicted, self.judged[at],
-            self.steady[at], self.drive[at], self.bands[at],
+            self.state[at], self.rows[at], self.measured[at], self.predicted.part(at),
+            self.judged[at], self.steady[at], self.drive[at], self.bands[at],
         )  # fmt: skip
 
 
@@ -202,7 +202,7 @@ class ObserverSignals:
         rate: float,
         jitters: bool = False,
     ) -> None:
-        self.layout = layout_of(base_model(plant.model), plant.port)
+        self.layout = layout_of(equations_of(plant), plant.port)
         self._motion = LaggedSignals(self.layout, plant.half_width, rate, plant.late, jitters)
         self._along = AlongMotion(plant, rate)
         self._drives = [DriveChanges() for _ in range(self.layout.motions[0])]
@@ -231,22 +231,18 @@ class ObserverSignals:
         )
         raw = np.column_stack(
             [
-                measured - predicted.output, predicted.dry, predicted.viscous, predicted.output,
-                disagreement, measured, predicted.weak - predicted.output,
-                predicted.late - predicted.output, predicted.held_late - predicted.output,
-                predicted.moved - predicted.output,
+                measured - predicted.output, *map(predicted.change, UNIT_FRICTION),
+                predicted.output, disagreement, measured,
+                *map(predicted.change, WITH_OTHER_INPUTS),
             ]
         )  # fmt: skip
         z, *changed = (
-            remainder_signals(rows, hidden, self.layout)
-            for hidden in (
-                predicted.hidden, predicted.weak_hidden, predicted.late_hidden,
-                predicted.held_late_hidden, predicted.moved_hidden,
-            )
-        )  # fmt: skip
+            remainder_signals(rows, predicted.states[:, run], self.layout)
+            for run in (Run.PLAIN, *WITH_OTHER_INPUTS)
+        )
         judged = self._high_passed.update(raw, z, np.stack(changed), state)
         unsure = steps.unsure * judged[:, LATE_UNIT]
-        judged = np.column_stack([judged, unsure, predicted.dry, steps.jitters])
+        judged = np.column_stack([judged, unsure, predicted.change(Run.DRY), steps.jitters])
         drives = [own.update(signals[:, place], code) for place, own in enumerate(self._drives)]
         for own in drives:
             steady &= ~own.changed

@@ -1,17 +1,18 @@
 """Equations driven along the measured motion, block by block, with carried hidden states.
 
-Two further predictions run with unit dry and unit viscous friction at the force port. Their
-differences to the plain prediction are the responses of the predicted output to friction of 1 N and
-of 1 N s/m, including everything in between (an inertia, the sensor's own high-pass). As the motion
-is given, the response is linear in the force. A fourth runs with inputs weaker by `WEAKER`, as of
-a drive that lost gain. A fifth runs with inputs late by `LATER`, which gives the response to inputs
-late by one sample, a sixth with inputs that are held and late by `LATER`: they lack steps before
-each sample only. A seventh runs with the inputs' edges between samples, where they are known to be
-regular.
+Beside the plain one run (`Run`) two with unit dry and unit viscous friction at the force port.
+Their differences to it are the responses of the predicted output to friction of 1 N and of 1 N s/m,
+including everything in between (an inertia, the sensor's own high-pass). As the motion is given,
+the response is linear in the force. One runs with inputs weaker by `WEAKER`, as of a drive that
+lost gain. One runs with inputs late by `LATER`, which gives the response to inputs late by one
+sample, one with inputs that are held and late by `LATER`: they lack steps before each sample only.
+The last runs with the inputs' edges between samples, where they are known to be regular.
 """
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,7 @@ from rigwatch.physics.engine.equations import (
     predicted_outputs,
     shipped_models,
     spelt_out,
+    with_variants,
 )
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
@@ -53,7 +55,7 @@ DRY, VISCOUS = "coulomb", "viscous"
 
 
 def base_model(name: str) -> Model:
-    """The model of equations named by a plant.
+    """The model of equations of this name.
 
     Raises:
         ModelError: there is none of this name.
@@ -64,6 +66,15 @@ def base_model(name: str) -> Model:
     if name not in known:
         raise ModelError(f"found model {name!r}, expected one of {', '.join(known)}, or a file")
     return known[name]
+
+
+def equations_of(plant: EquationsPlant) -> Model:
+    """The model of equations of a plant, with its variants.
+
+    Raises:
+        ModelError: there is no such model, or it has no such variants.
+    """
+    return with_variants(base_model(plant.model), plant.variants)
 
 
 def force_port(model: Model) -> str:
@@ -123,29 +134,57 @@ def _fixed(effect: Effect) -> Effect:
     return replace(effect, parameters=parameters)
 
 
+class Run(IntEnum):
+    """The runs of a prediction, in order."""
+
+    PLAIN = 0
+    DRY = 1
+    VISCOUS = 2
+    WEAK = 3
+    LATE = 4
+    HELD_LATE = 5
+    MOVED = 6
+
+
+UNIT_FRICTION = (Run.DRY, Run.VISCOUS)
+WITH_OTHER_INPUTS = (Run.WEAK, Run.LATE, Run.HELD_LATE, Run.MOVED)
+
+
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """Columns of the prediction, each of shape (n,) or (n, hidden states).
+    """What the runs predict.
 
-    `weak` and `weak_hidden` are output and hidden states with inputs weaker by `WEAKER`, `late` and
-    `late_hidden` those with inputs late by `LATER`, `held_late` and `held_late_hidden` those with
-    inputs that are held as well, `moved` and `moved_hidden` those with edges between samples;
-    `reset` marks samples at which the states diverged.
+    Attributes:
+        outputs: the predicted output, shape (n, runs).
+        states: hidden states, shape (n, runs, hidden).
+        reset: whether the states diverged at a sample, shape (n,).
     """
 
-    output: FloatArray
-    dry: FloatArray
-    viscous: FloatArray
-    weak: FloatArray
-    late: FloatArray
-    held_late: FloatArray
-    hidden: FloatArray
-    weak_hidden: FloatArray
-    late_hidden: FloatArray
-    held_late_hidden: FloatArray
-    moved: FloatArray
-    moved_hidden: FloatArray
+    outputs: FloatArray
+    states: FloatArray
     reset: BoolArray
+
+    @property
+    def output(self) -> FloatArray:
+        """The predicted output of the plain run, shape (n,)."""
+        return self.outputs[:, Run.PLAIN]
+
+    @property
+    def hidden(self) -> FloatArray:
+        """Hidden states of the plain run, shape (n, hidden)."""
+        return self.states[:, Run.PLAIN]
+
+    def change(self, run: Run) -> FloatArray:
+        """What the output of a run has beyond that of the plain one, shape (n,)."""
+        return self.outputs[:, run] - self.output
+
+    def part(self, at: slice) -> "Predicted":
+        """Some samples."""
+        return Predicted(self.outputs[at], self.states[at], self.reset[at])
+
+
+Rows = Mapping[Run, FloatArray]
+"""Inputs and motion of each run, shape (n, inputs)."""
 
 
 class AlongMotion:
@@ -156,7 +195,7 @@ class AlongMotion:
     """
 
     def __init__(self, plant: EquationsPlant, rate: float) -> None:
-        base = base_model(plant.model)
+        base = equations_of(plant)
         model = driven(base, frozenset())
         self._rates = rate_columns(base)
         frictions = friction_at(plant.port, plant.turn)
@@ -166,12 +205,15 @@ class AlongMotion:
         strengths = [f"{p.prefix}{p.effect.strength}" for p in frictions]
         values = dict(zip(plant.names, plant.values, strict=True))
         healthy = values | {strengths[0]: plant.coulomb, strengths[1]: 0.0}
-        cases = [healthy, *(healthy | {name: healthy[name] + 1.0} for name in strengths)]
-        self._parameters = [self._compiled.vector(case) for case in (*cases, *[healthy] * 4)]
-        self._states = [np.zeros(0)] * len(self._parameters)
+        unit = {
+            run: {name: healthy[name] + 1.0}
+            for run, name in zip(UNIT_FRICTION, strengths, strict=True)
+        }
+        self._parameters = [self._compiled.vector(healthy | unit.get(run, {})) for run in Run]
+        self._states = [np.zeros(0)] * len(Run)
         self._usual: FloatArray | None = None
         self._slow = plant.turn
-        self._last = np.zeros((5, 0))
+        self._last = dict.fromkeys(Run, np.zeros(0))
         self._pause = -1
 
     def follow(self, usual: FloatArray | None) -> None:
@@ -199,20 +241,10 @@ class AlongMotion:
         """
         n = len(rows)
         self._wait(state)
-        weaker, later, held = rows.copy(), rows.copy(), rows.copy()
-        inputs = moved.shape[1]
-        weaker[:, :inputs] *= 1.0 - WEAKER
-        later[:, :inputs] -= LATER * steps[0]
-        held[:, :inputs] -= LATER * steps[1]
-        between = rows.copy()
-        between[:, :inputs] += moved
-        output, dry, viscous, weak, late, held_late, edged = np.zeros((7, n))
-        hidden, weak_hidden, late_hidden, held_hidden, edged_hidden = np.zeros((5, n, self.hidden))
-        reset = np.zeros(n, np.bool_)
+        given = _given(rows, steps, moved)
         out = Predicted(
-            output, dry, viscous, weak, late, held_late, hidden, weak_hidden, late_hidden,
-            held_hidden, edged, edged_hidden, reset,
-        )  # fmt: skip
+            np.zeros((n, len(Run))), np.zeros((n, len(Run), self.hidden)), np.zeros(n, np.bool_)
+        )
         begin = 0
         while begin < n:
             if state[begin] == EMPTY:
@@ -221,9 +253,9 @@ class AlongMotion:
             if state[begin] == FIRST:
                 self._begin(rows[begin], steps[0, begin])
             end = _end(state, moves, begin)
-            given = [each[begin:end] for each in (rows, weaker, later, held, between)]
-            begin += self._run(given, bool(moves[begin]), begin, out)
-            if reset[begin - 1]:
+            own = {run: each[begin:end] for run, each in given.items()}
+            begin += self._run(own, bool(moves[begin]), begin, out)
+            if out.reset[begin - 1]:
                 self._pause = PAUSE
                 self._wait(state[begin - 1 :])
         return out
@@ -246,58 +278,61 @@ class AlongMotion:
         begin with the acceleration that a lasting crest causes, and forget it only with the
         sensor's corner.
         """
-        self._last = np.stack([row] * 5)
+        self._last = dict.fromkeys(Run, row.copy())
         moves = np.abs(row[self._rates]).max(initial=0.0) > self._slow or np.any(steps)
         if self._usual is not None and moves:
-            self._states = [self._usual] * len(self._parameters)
+            self._states = [self._usual] * len(Run)
             return
         still = np.repeat(row[None, :], round(SETTLING / self._dt), axis=0)
         still[:, self._rates] = 0.0
-        for case, parameters in enumerate(self._parameters):
-            self._states[case] = balanced(self._compiled, parameters, still, self._dt)
+        for run, parameters in zip(Run, self._parameters, strict=True):
+            self._states[run] = balanced(self._compiled, parameters, still, self._dt)
 
-    def _run(self, rows: list[FloatArray], moves: bool, first: int, out: Predicted) -> int:
+    def _run(self, rows: Rows, moves: bool, first: int, out: Predicted) -> int:
         """Run along the rows until they end or diverge; returns the number done.
 
         Args:
-            rows: as they are, weaker, late, held and late, and with edges between samples.
-            moves: whether the last differ from the first.
+            rows: of each run.
+            moves: whether those with edges between samples differ from the plain ones.
             first: index of the first row.
             out: to be filled.
         """
-        plain, weaker, shifted, held, between = (
-            np.concatenate([last[None, :], own]) for last, own in zip(self._last, rows, strict=True)
-        )
-        given = [plain] * (len(self._parameters) - 4) + [weaker, shifted, held]
-        made = [self._simulated(case, own) for case, own in enumerate(given)]
-        made.append(self._simulated(len(given), between) if moves else made[0])
-        outputs = np.stack([one.outputs[0, 1:] for one in made])
+        given = {run: np.concatenate([self._last[run][None, :], rows[run]]) for run in Run}
+        made = {run: self._simulated(run, given[run]) for run in Run if moves or run != Run.MOVED}
+        if not moves:
+            made[Run.MOVED] = made[Run.PLAIN]
+        outputs = np.stack([made[run].outputs[0, 1:] for run in Run], axis=1)
         # Also false for NaN; the hidden states are among the outputs.
-        within = (np.abs(outputs) <= LARGEST).all(axis=(0, 2))
+        within = (np.abs(outputs) <= LARGEST).all(axis=(1, 2))
         if good := bool(within.all()):
-            self._states = [one.last[0] for one in made]
-            self._last = np.stack([own[-1] for own in rows])
-        kept = len(plain) - 1 if good else int(np.argmin(within))
-        at, outputs = slice(first, first + kept), outputs[:, :kept]
-        out.output[at], out.hidden[at] = outputs[0, :, 0], outputs[0, :, 1:]
-        out.dry[at] = outputs[1, :, 0] - outputs[0, :, 0]
-        out.viscous[at] = outputs[2, :, 0] - outputs[0, :, 0]
-        out.weak[at], out.weak_hidden[at] = outputs[3, :, 0], outputs[3, :, 1:]
-        out.late[at], out.late_hidden[at] = outputs[4, :, 0], outputs[4, :, 1:]
-        out.held_late[at], out.held_late_hidden[at] = outputs[5, :, 0], outputs[5, :, 1:]
-        out.moved[at], out.moved_hidden[at] = outputs[6, :, 0], outputs[6, :, 1:]
+            self._states = [made[run].last[0] for run in Run]
+            self._last = {run: own[-1].copy() for run, own in rows.items()}
+        kept = len(outputs) if good else int(np.argmin(within))
+        at, outputs = slice(first, first + kept), outputs[:kept]
+        out.outputs[at], out.states[at] = outputs[..., 0], outputs[..., 1:]
         if good:
             return kept
         out.reset[first + kept] = True
         return kept + 1
 
-    def _simulated(self, case: int, inputs: FloatArray) -> Simulation:
+    def _simulated(self, run: Run, inputs: FloatArray) -> Simulation:
         with np.errstate(over="ignore", invalid="ignore"):
             return self._compiled.simulate(
                 inputs, self._dt, np.zeros(1, np.int64), len(inputs),
-                initial=self._states[case][None, :], parameters=self._parameters[case],
+                initial=self._states[run][None, :], parameters=self._parameters[run],
                 substeps=SUBSTEPS,
             )  # fmt: skip
+
+
+def _given(rows: FloatArray, steps: FloatArray, moved: FloatArray) -> Rows:
+    """The rows of each run, see `AlongMotion.update`."""
+    inputs = slice(moved.shape[1])
+    changed = {run: rows.copy() for run in WITH_OTHER_INPUTS}
+    changed[Run.WEAK][:, inputs] *= 1.0 - WEAKER
+    changed[Run.LATE][:, inputs] -= LATER * steps[0]
+    changed[Run.HELD_LATE][:, inputs] -= LATER * steps[1]
+    changed[Run.MOVED][:, inputs] += moved
+    return dict.fromkeys(Run, rows) | changed
 
 
 def _end(state: Codes, moves: BoolArray, begin: int) -> int:

@@ -21,7 +21,7 @@ from itertools import chain
 import numpy as np
 
 from monitor.model import EquationsPlant, RigModel
-from monitor.observer import base_model
+from monitor.observer import equations_of
 from monitor.pipeline.observer_pipeline import ObserverMonitor
 from monitor.pipeline.result import Result
 from monitor.signals import Condition, above
@@ -160,7 +160,7 @@ def drive_trial(model: RigModel) -> DriveTrial | None:
         ModelError: its equations are invalid.
     """
     assert isinstance(model.plant, EquationsPlant)
-    return DriveTrial(model) if len(base_model(model.plant.model).inputs) == 1 else None
+    return DriveTrial(model) if len(equations_of(model.plant).inputs) == 1 else None
 
 
 class _Tried:

@@ -25,9 +25,9 @@ from monitor.observer import (
     ObserverSignals,
     RangeSeen,
     UsualError,
-    base_model,
     decide,
     drive_energy,
+    equations_of,
     friction_limit,
     levels,
 )
@@ -59,7 +59,7 @@ class ObserverMonitor:
             model.channels, model.channels, model.decision.longest_hold, model.sample_rate
         )
         self._signals = ObserverSignals(plant, remainder, model.sample_rate)
-        self._equations = base_model(plant.model)
+        self._equations = equations_of(plant)
         self._follow(model)
 
     @property

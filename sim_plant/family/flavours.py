@@ -99,4 +99,9 @@ FLAVOURS: dict[str, Flavour] = {
         own=None, added=Friction.STRIBECK, abrupt=True, fine_position=True,
         late_fault="lag", stranger="blockage", softer=True,
     ),
+    "regulated": Flavour(
+        "judged", Flow.ISENTROPIC, Heat.POLYTROPIC, Stage.REGULATED,
+        own=Friction.LUGRE, added=Friction.STRIBECK, high_passes=2, fine_position=True,
+        late_fault="delay", stranger="middle", regulated=True,
+    ),
 }  # fmt: skip

@@ -10,6 +10,11 @@ Symbols: P absolute pressure [Pa], w flow times R T0 [Pa m^3/s], wl leak across 
 
 A pressure stage feeds each chamber through one restriction from Pm +- gain u; a bridge feeds it
 from the supply through c (1 + u) and empties it through a nozzle r c (1 - u), and crosswise.
+A regulated stage feeds each through one restriction from the outlet of a pressure regulator, whose
+volume Vr a valve of limited flow fills or empties, opened by o of a PI controller:
+
+    Vr dU/dt = wr(o) - w,     o = kp e + ki ∫e dt within ±1,     e = Pm +- gain u - U
+
 Isothermal gas has n = 1, polytropic gas its own n. With the energy balance, gas that enters has the
 room's temperature T0, gas that leaves has the chamber's T, and the wall returns h (T0 - T) [W]:
 
@@ -40,7 +45,8 @@ SUBSTEPS = 48
 """Runge-Kutta steps in one sample."""
 GAMMA = 1.4
 X, V, P1, P2, T1, T2, S, S_RATE, Z_OWN, Z_ADDED, LVDT, HIGH_1, HIGH_2, AMPLIFIER = range(14)
-STATES = 14
+U1, U2, OPEN_1, OPEN_2 = range(14, 18)
+STATES = 18
 
 LAWS = ("flow", "heat", "stage", "own_friction", "added_friction")
 QUANTITIES = (
@@ -49,7 +55,8 @@ QUANTITIES = (
     "leak", "exponent", "wall", "valve_rate", "valve_damping", "valve_gain", "valve_null",
     "asymmetry", "hysteresis", "slew", "centring", "viscous", "own_level", "static_ratio",
     "stribeck_speed", "bristle", "bristle_damping", "smooth_speed", "lvdt_rate", "lvdt_step",
-    "lvdt_offset", "high_pass_1", "high_pass_2", "amplifier_rate",
+    "lvdt_offset", "high_pass_1", "high_pass_2", "amplifier_rate", "outlet", "regulator_flow",
+    "regulator_gain", "regulator_reset",
 )  # fmt: skip
 MEMBER_TYPE = np.dtype([(n, np.int64) for n in LAWS] + [(n, np.float64) for n in QUANTITIES])
 """Laws and quantities of a member, in SI units; rates in rad/s."""
@@ -74,7 +81,7 @@ def hidden_effects(values: dict[str, float]) -> NDArray[np.void]:
 ISO_6358, ORIFICE, WEYMOUTH = int(Flow.ISO_6358), int(Flow.ORIFICE), int(Flow.WEYMOUTH)
 BLEND, ISENTROPIC = int(Flow.BLEND), int(Flow.ISENTROPIC)
 POLYTROPIC, ENERGY = int(Heat.POLYTROPIC), int(Heat.ENERGY)
-BRIDGE = int(Stage.BRIDGE)
+BRIDGE, REGULATED = int(Stage.BRIDGE), int(Stage.REGULATED)
 TANH, KARNOPP, LUGRE = int(Friction.TANH), int(Friction.KARNOPP), int(Friction.LUGRE)
 STRIBECK = int(Friction.STRIBECK)
 _GAS = 287.05
@@ -178,6 +185,9 @@ def chamber_flows(y: Floats, p: Record, e: Record, time: float) -> tuple[float, 
         w1 -= flow(law, y[P1], p.ambient, c1 * p.nozzle_ratio * (1.0 - u), b, lam)
         w2 = flow(law, ps, y[P2], c2 * (1.0 - u), b, lam)
         w2 -= flow(law, y[P2], p.ambient, c2 * p.nozzle_ratio * (1.0 + u), b, lam)
+    elif p.stage == REGULATED:
+        w1 = flow(law, y[U1], y[P1], c1, b, lam)
+        w2 = flow(law, y[U2], y[P2], c2, b, lam)
     else:
         top = p.supply * factor
         up1 = min(max(factor * (e.middle * p.middle + u), p.ambient), top)
@@ -185,6 +195,29 @@ def chamber_flows(y: Floats, p: Record, e: Record, time: float) -> tuple[float, 
         w1 = flow(law, up1, y[P1], c1, b, lam)
         w2 = flow(law, up2, y[P2], c2, b, lam)
     return w1, w2, p.leak * (y[P1] - y[P2])
+
+
+@part(error_model="numpy")
+def regulated(  # noqa: PLR0917
+    asked: float, pressure: float, integral: float, drawn: float, top: float, p: Record
+) -> tuple[float, float]:
+    """Rates of a regulator's outlet pressure [Pa/s] and of its integral part [1/s].
+
+    Args:
+        asked: pressure asked for [Pa].
+        pressure: at the outlet [Pa].
+        integral: of the opening.
+        drawn: flow that leaves the outlet, times R T0 [Pa m^3/s].
+        top: pressure of the supply [Pa].
+    """
+    error = asked - pressure
+    wanted = p.regulator_gain * error + integral
+    opening = min(max(wanted, -1.0), 1.0)
+    end = top if opening > 0.0 else p.ambient
+    through = flow(p.flow, end, pressure, p.regulator_flow, p.critical_ratio, p.laminar)
+    winds_up = wanted != opening and wanted * error > 0.0
+    rate = 0.0 if winds_up else p.regulator_reset * error
+    return (abs(opening) * through - drawn) / p.outlet, rate
 
 
 @part(error_model="numpy")
@@ -245,6 +278,14 @@ def rates(  # noqa: PLR0917
         dy[S_RATE] = p.valve_rate**2 * (u - y[S]) - 2.0 * p.valve_damping * p.valve_rate * y[S_RATE]
     else:
         dy[S], dy[S_RATE] = p.valve_rate * (u - y[S]), 0.0
+    if p.stage == REGULATED:
+        factor = e.supply * (1.0 + e.ripple * math.sin(e.ripple_rate * time))
+        top, asked = p.supply * factor, factor * e.middle * p.middle
+        u = p.valve_gain * (y[S] + p.valve_null)
+        dy[U1], dy[OPEN_1] = regulated(asked + u, y[U1], y[OPEN_1], w1, top, p)
+        dy[U2], dy[OPEN_2] = regulated(asked - u, y[U2], y[OPEN_2], w2, top, p)
+    else:
+        dy[U1] = dy[U2] = dy[OPEN_1] = dy[OPEN_2] = 0.0
     dy[Z_OWN] = bristle_rate(p.own_friction, v, y[Z_OWN], p)
     dy[LVDT] = p.lvdt_rate * (x - y[LVDT])
     dy[HIGH_1] = p.high_pass_1 * (a - y[HIGH_1])

@@ -27,6 +27,7 @@ class Stage(IntEnum):
 
     PRESSURE = 0
     BRIDGE = 1
+    REGULATED = 2
 
 
 class Friction(IntEnum):

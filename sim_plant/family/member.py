@@ -113,7 +113,7 @@ def at_rest(member: Member, hidden: dict[str, float] | None = None) -> NDArray[n
     """States some seconds after the valve got 0 V, with `hidden` effects of the plant."""
     y = member.rest.copy()
     if y[kernel.P1] == 0.0:
-        y[[kernel.P1, kernel.P2]] = member["middle"]
+        y[[kernel.P1, kernel.P2, kernel.U1, kernel.U2]] = member["middle"]
         y[[kernel.T1, kernel.T2]] = ROOM_TEMPERATURE
     free_run(member, np.zeros(round(_REST_S * RATE)), y, hidden)
     y[[kernel.V, kernel.S_RATE, kernel.HIGH_1, kernel.HIGH_2, kernel.AMPLIFIER]] = 0.0

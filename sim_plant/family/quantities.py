@@ -122,6 +122,24 @@ def set_restrictions(record: NDArray[np.void], random: Random) -> None:
         record[f"conductance_{side}"] = swept / through
     record["nozzle_ratio"] = ratio
     record["leak"] = random.uniform(0.0, 0.03) * swept / drop
+    if p["stage"] == Stage.REGULATED:
+        _set_regulator(record, random, swept / unit(p["supply"], middle), swept)
+
+
+def _set_regulator(record: NDArray[np.void], random: Random, whole: float, swept: float) -> None:
+    """Outlets, flow and controller of pressure regulators.
+
+    Args:
+        record: of the member.
+        random: source of what is drawn.
+        whole: conductance through which the supply feeds a piston at 0.25 m/s [m^3/s].
+        swept: that flow, times R T0 [Pa m^3/s].
+    """
+    outlet, larger = random.uniform(1.5e-6, 4e-6), random.uniform(4.0, 8.0)
+    bandwidth = 2 * np.pi * random.uniform(15.0, 40.0)
+    record["outlet"], record["regulator_flow"] = outlet, larger * whole
+    record["regulator_gain"] = bandwidth * outlet / (larger * swept)
+    record["regulator_reset"] = record["regulator_gain"] * bandwidth / random.uniform(3.0, 8.0)
 
 
 def lateness(kind: Flavour, random: Random) -> tuple[int, int]:

@@ -84,6 +84,16 @@ def test_a_held_reading_is_no_repeat() -> None:
     assert evidence([block(channels)]).max() < 3.0
 
 
+def test_a_reading_that_sticks_at_a_peak_is_not_clipped() -> None:
+    channels = run(SINE, 8.0, seed=34)
+    start = int(5.0 * RATE)
+    peak = start + int(np.argmax(channels["acceleration"][start : start + int(RATE)]))
+    channels["acceleration"][peak:] = channels["acceleration"].max()
+    result = Monitor(model()).update(block(channels))
+    assert result is not None
+    assert not active(result, "sensor_clipped.acceleration").any()
+
+
 def test_a_model_without_the_figures_judges_no_channel() -> None:
     old = structs.replace(model(), noise=structs.replace(model().noise, repeat=()))
     result = Monitor(old).update(block({name: np.ones(600) for name in UNITS}))

@@ -130,7 +130,7 @@ def _commissioned(
         ModelError: the equations do not describe the rig, or a recording is not healthy.
     """
     say("1 of 3: parameters of the equations")
-    plant = fitted_equations(used, name, CORNER, rate, jitters, stated)
+    plant = fitted_equations(used, name, CORNER, rate, jitters, stated, say)
     say("2 of 3: what the healthy rig leaves of them")
     try:
         parts, roles, remainder, scheme = healthy_remainder(used, plant, rate, jitters)

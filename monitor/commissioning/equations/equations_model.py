@@ -26,9 +26,9 @@ from monitor.observer import (
     Layout,
     Observed,
     Spectrum,
-    base_model,
     bends_of,
     drive_energy,
+    equations_of,
     layout_of,
     levels,
     range_of,
@@ -58,7 +58,7 @@ def equations_model(  # noqa: PLR0917 -- all that was found
         roles: their roles.
         rate: sample rate [Hz].
     """
-    model = base_model(plant.model)
+    model = equations_of(plant)
     layout = layout_of(model, plant.port)
     slow, skip = slow_speed(parts, layout, plant), round(SKIPPED * rate)
     motions = _motions_of(parts, layout, slow, rate, bends_of(used, model))

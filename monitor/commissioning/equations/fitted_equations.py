@@ -1,13 +1,14 @@
 """Parameters of the equations from the first part of each healthy recording."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from scipy.signal import savgol_coeffs
 
 from monitor.commissioning.equations.described import STARTED
-from monitor.commissioning.equations.healthy_fit import fit_healthy
+from monitor.commissioning.equations.healthy_fit import Stretches
 from monitor.commissioning.equations.sensor_chain import fit_sensor
+from monitor.commissioning.equations.variant_search import fit_with_variants
 from monitor.commissioning.unhealthy import white_noise
 from monitor.model import (
     EquationsPlant,
@@ -42,6 +43,7 @@ def fitted_equations(  # noqa: PLR0917 -- all that is known
     rate: float,
     jitters: Sequence[bool],
     stated: Mapping[str, float],
+    say: Callable[[str], None] = lambda _: None,
 ) -> EquationsPlant:
     """The equations with parameters from the first part of each recording.
 
@@ -52,6 +54,7 @@ def fitted_equations(  # noqa: PLR0917 -- all that is known
         rate: sample rate [Hz].
         jitters: of which recordings the inputs' steps jitter.
         stated: parameters that are known, in SI.
+        say: called with one line at each step.
     """
     model = base_model(name)
     port = force_port(model)
@@ -65,17 +68,15 @@ def fitted_equations(  # noqa: PLR0917 -- all that is known
     n = layout.inputs
     known = fit_sensor(model, [(m[:, :n], m[:, n], m[:, n + 1]) for m in moved], rate)
     known |= stated
-    stretches = [
-        _cut(m, layout, round((CHIRP if one.role == "chirp" else FITTED) * rate))
-        for one, m in zip(used, moved, strict=True)
-    ]
+    parts = [(np.ascontiguousarray(m[:, :n]), np.ascontiguousarray(m[:, [n]])) for m in moved]
+    fitted = [round((CHIRP if one.role == "chirp" else FITTED) * rate) for one in used]
     turn = TURNS * _speed_noise(used, layout, lag, rate)
     noise = min(white_noise(one.channel(layout.channels[-1])) for one in used)
-    found = fit_healthy(
-        name, port, stretches, turn=turn, corner=corner, rate=rate, noise=noise, known=known
-    )
+    data = Stretches(port, parts, fitted, turn, corner, rate, noise, known)
+    variants, found = fit_with_variants(model, data, say)
     return EquationsPlant(
-        model=name, names=found.names, values=found.values, port=port, coulomb=found.coulomb,
+        model=name, variants=variants, names=tuple(found.values),
+        values=tuple(found.values.values()), port=port, coulomb=found.coulomb,
         turn=turn, half_width=lag, late=late, corner=corner,
     )  # fmt: skip
 
@@ -115,11 +116,6 @@ def admitted(one: Recording, layout: Layout) -> tuple[FloatArray, Codes]:
     code = np.full(len(signals), GOOD, np.int64)
     code[0] = NEW_BOOT
     return signals, code
-
-
-def _cut(moved: FloatArray, layout: Layout, n: int) -> tuple[FloatArray, FloatArray]:
-    inputs = layout.inputs
-    return np.ascontiguousarray(moved[:n, :inputs]), np.ascontiguousarray(moved[:n, [inputs]])
 
 
 def _speed_noise(used: Sequence[Recording], layout: Layout, lag: int, rate: float) -> float:

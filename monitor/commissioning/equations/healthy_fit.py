@@ -14,7 +14,6 @@ from monitor.observer import (
     SETTLING,
     SUBSTEPS,
     balanced,
-    base_model,
     driven,
     friction_at,
     high_pass,
@@ -22,9 +21,10 @@ from monitor.observer import (
 )
 from rigwatch.physics.engine.compile import compile_system
 from rigwatch.physics.engine.equations import Model, System, compose
-from rigwatch.physics.engine.fit import Recording, Thinning
+from rigwatch.physics.engine.fit import Fit, Recording, Thinning, beginning, evaluate
 from rigwatch.physics.engine.search import WholeRuns, multi_start_fit
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.errors import ModelError
 
 SPREAD, UNBOUND = 0.15, 2.0
 """Prior spread of parameters around the file's values: in the logarithm, as a share of the range
@@ -37,67 +37,108 @@ EDGE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class HealthyFit:
-    """A fitted model.
+class Stretches:
+    """Healthy recordings, their fitted parts, and all that is known beforehand.
 
     Attributes:
-        names, values: parameters of the model.
-        coulomb: dry friction of the healthy rig [N].
-        rms: of the high-passed residual over all stretches.
-    """
-
-    names: tuple[str, ...]
-    values: tuple[float, ...]
-    coulomb: float
-    rms: float
-
-
-def fit_healthy(
-    name: str,
-    port: str,
-    stretches: Sequence[tuple[FloatArray, FloatArray]],
-    *,
-    turn: float,
-    corner: float,
-    rate: float,
-    noise: float,
-    known: Mapping[str, float],
-) -> HealthyFit:
-    """Parameters of the model named `name` from healthy recordings.
-
-    Args:
-        name: of a shipped model, or its file.
         port: where friction enters.
-        stretches: inputs and motion, shape (n, inputs), and the output, shape (n, 1), smoothed.
+        parts: inputs and motion, shape (n, inputs), and the output, shape (n, 1), of each
+            recording.
+        fitted: samples of each that are fitted; those that follow judge.
         turn: speed over which dry friction changes sign.
         corner: of the high-pass [Hz].
         rate: sample rate [Hz].
         noise: of the measured output, rms.
         known: parameters already determined, which are fixed.
     """
-    model = base_model(name)
+
+    port: str
+    parts: Sequence[tuple[FloatArray, FloatArray]]
+    fitted: Sequence[int]
+    turn: float
+    corner: float
+    rate: float
+    noise: float
+    known: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class HealthyFit:
+    """A fitted model.
+
+    Attributes:
+        model: that was fitted.
+        values: its parameters, by name.
+        coulomb: dry friction of the healthy rig [N].
+        error: rms of the high-passed residual over the fitted parts, in that of the sensor's noise.
+        later: the same over what follows them; infinite if the model diverges there, NaN if
+            nothing follows.
+    """
+
+    model: Model
+    values: Mapping[str, float]
+    coulomb: float
+    error: float
+    later: float
+
+
+def fit_healthy(
+    model: Model, data: Stretches, start: Mapping[str, float] | None = None, *, brief: bool = False
+) -> HealthyFit:
+    """Parameters of a model from healthy recordings.
+
+    Args:
+        model: of equations.
+        data: the recordings.
+        start: initial values of its parameters; its own for those not given.
+        brief: whether one short search from there is enough.
+
+    Raises:
+        ModelError: the simulation along the motion diverges.
+    """
     free = frozenset(n for n, p in model.parameters.items() if p.kept or not p.fixed)
-    friction = friction_at(port, turn)[:1]
-    system = compose(_balance(driven(model, free - set(known))), friction)
-    judged = Thinning(1, round(EDGE * rate), (), high_pass(corner, rate))
-    recordings = [Recording(1.0 / rate, rows, output, judged) for rows, output in stretches]
+    friction = friction_at(data.port, data.turn)[:1]
+    system = compose(_balance(driven(model, free - set(data.known))), friction)
+    judged = Thinning(1, round(EDGE * data.rate), (), high_pass(data.corner, data.rate))
+    recordings = [Recording(1.0 / data.rate, rows, output, judged) for rows, output in data.parts]
+    parts = [beginning(one, n) for one, n in zip(recordings, data.fitted, strict=True)]
     compiled = compile_system(system)
-    start = compiled.vector(dict(known))
-    count = sum(len(each) - 2 * judged.edge for each in recordings)
-    still = [_still(model, each.inputs[0], rate) for each in recordings]
-    begun = [balanced(compiled, start, rows, 1.0 / rate) for rows in still]
+    begin = compiled.vector({**(start or {}), **data.known})
+    count = sum(len(each) - 2 * judged.edge for each in parts)
+    still = [_still(model, each.inputs[0], data.rate) for each in parts]
+    begun = np.array([balanced(compiled, begin, rows, 1.0 / data.rate) for rows in still])
     found, _ = multi_start_fit(
         WholeRuns(
-            compiled, recordings, np.array([noise]), start=start,
-            pull=PULL * np.sqrt(count) / _spreads(system), initial=np.array(begun),
-            robust=np.inf, substeps=SUBSTEPS,
+            compiled, parts, np.array([data.noise]), start=begin,
+            pull=PULL * np.sqrt(count) / _spreads(system), initial=begun,
+            robust=np.inf, substeps=SUBSTEPS, brief=brief,
         )
     )  # fmt: skip
     values = found.values()
     strength = friction[0].prefix + str(friction[0].effect.strength)
-    names = tuple(model.parameters)
-    rms = float(found.rms[0])
-    return HealthyFit(names, tuple(values[n] for n in names), max(values[strength], 0.0), rms)
+    later = [_left_later(found, *each) for each in zip(recordings, data.fitted, begun, strict=True)]
+    return HealthyFit(
+        model,
+        {name: values[name] for name in model.parameters},
+        max(values[strength], 0.0),
+        float(found.rms[0]) / data.noise,
+        _rms(np.concatenate(later)) / data.noise,
+    )
+
+
+def _left_later(found: Fit, recording: Recording, fitted: int, begun: FloatArray) -> FloatArray:
+    """The high-passed residual of what follows the fitted part; infinite if it diverges."""
+    if recording.thinning is None or len(recording) <= fitted + 2 * recording.thinning.edge:
+        return np.zeros(0)
+    try:
+        whole = evaluate(found, recording, len(recording), SUBSTEPS, begun[None, :])
+    except ModelError:
+        return np.array([np.inf])
+    return whole.residuals[0, fitted - recording.thinning.edge :, 0]
+
+
+def _rms(residual: FloatArray) -> float:
+    return float(np.sqrt(np.mean(residual**2))) if len(residual) else np.nan
 
 
 def _balance(model: Model) -> Model:

@@ -19,7 +19,7 @@ from monitor.observer import (
     ObserverSignals,
     SpectralWidth,
     Spectrum,
-    base_model,
+    equations_of,
     fit_remainder,
     high_pass,
     layout_of,
@@ -43,7 +43,7 @@ def healthy_remainder(
     Raises:
         ModelError: the residual is too large, or a recording is not healthy.
     """
-    layout = layout_of(base_model(plant.model), plant.port)
+    layout = layout_of(equations_of(plant), plant.port)
     size = ObserverSignals(plant, no_remainder(0), rate).remainder_size
     bare = _observed(used, plant, no_remainder(size), rate, jitters)
     filters, skip = high_pass(plant.corner, rate), round(SKIPPED * rate)

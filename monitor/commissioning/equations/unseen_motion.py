@@ -20,7 +20,7 @@ from monitor.observer import (
     Layout,
     Observed,
     RangeSeen,
-    base_model,
+    equations_of,
     fit_remainder,
     high_pass,
     layout_of,
@@ -81,7 +81,7 @@ def unseen_ratio(
 
 def _layout(model: RigModel) -> Layout:
     assert isinstance(model.plant, EquationsPlant)
-    return layout_of(base_model(model.plant.model), model.plant.port)
+    return layout_of(equations_of(model.plant), model.plant.port)
 
 
 def _relative_energies(

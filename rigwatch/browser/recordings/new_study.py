@@ -56,6 +56,8 @@ def make_study(
     spans: Sequence[Part],
     own: Path | None = None,
     values: Mapping[str, float] | None = None,
+    *,
+    variants: Sequence[str] = (),
 ) -> Study:
     """Create a study in `folder`.
 
@@ -64,6 +66,7 @@ def make_study(
         begin: name of a template, or "model:" followed by the name of a model.
         own: own model file in place of `begin`.
         values: initial values of the model's parameters, in its units.
+        variants: of the model.
         spans: use, recording, start and end [s] of each part.
 
     Raises:
@@ -91,6 +94,8 @@ def make_study(
         file = structs.replace(_template(kind), train=train, held_out=held_out, healthy=healthy)
     if values:
         file = structs.replace(file, start=dict(values))
+    if variants:
+        file = structs.replace(file, variants=tuple(variants))
     return start_study(folder, as_toml(_said(file)))
 
 

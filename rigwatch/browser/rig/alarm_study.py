@@ -78,7 +78,8 @@ def _made(folder: Path, config: RigConfig, parts: Sequence[Part]) -> Study:
         return make_study(folder, TEMPLATE, parts)
     start = dict(zip(plant.names, plant.values, strict=True))
     own = Path(plant.model) if plant.model.endswith(".toml") else None
-    return make_study(folder, f"model:{plant.model}", parts, own, start)
+    begin = f"model:{plant.model}"
+    return make_study(folder, begin, parts, own, start, variants=plant.variants)
 
 
 def _lengths(alarm: Alarm, onset: Onset, now: float) -> tuple[float, float]:

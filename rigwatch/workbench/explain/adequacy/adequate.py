@@ -27,8 +27,6 @@ MOST = 5.0
 """Largest ratio of the healthy recording's error to its noise at which a model is adequate."""
 ENOUGH = 2.0
 """The same at which the search for an adequate base ends."""
-CLOSE = 1.5
-"""The same above which a better base is looked for where repeated periods show the noise."""
 ADVICE = "try another model or other starting values, or record a healthy run that excites it more"
 VARIED = "`rigwatch study base {study} --take enough` searches for better variants of the model"
 
@@ -257,7 +255,7 @@ def _may_search(bench: Bench) -> bool:
 
 def _leaves_more_than_noise(healthy: _OnHealthy | None) -> bool:
     """Whether the healthy recording's error is above a noise that its repeated periods show."""
-    return healthy is not None and healthy.noise.method == "periods" and healthy.ratio > CLOSE
+    return healthy is not None and healthy.noise.method == "periods" and healthy.ratio > AT_NOISE
 
 
 def _is_inadequate(bench: Bench, healthy: _OnHealthy | None) -> bool:
