@@ -29,6 +29,7 @@ from rigwatch.wire.host import (
     prepare_for_real_time,
     raise_priority,
     set_at_signal,
+    unless_ended,
 )
 from rigwatch.wire.rig_config import RigConfig, load_rig
 
@@ -131,12 +132,19 @@ def run(path: Path | str, stop: threading.Event) -> None:
         DeviceError: the adapter is not installed, or another process holds the device.
     """
     config = load_rig(path)
-    adapter = adapter_for(config.daq.device, config.channels)
+    adapter = unless_ended(stop, lambda: _prepared(config))
     raise_priority(DAQ)
     with joined(config, "daq", stop) as bus:
         prepare_for_real_time()
         if bus is not None:
             acquire(config, adapter, bus, stop, Heartbeat("daq"))
+
+
+def _prepared(config: RigConfig) -> Adapter:
+    """The rig's adapter, with all kernels compiled that its samples need."""
+    adapter = adapter_for(config.daq.device, config.channels)
+    Acquisition(config, adapter.clock_rate)
+    return adapter
 
 
 def main(path: Path | str) -> int:

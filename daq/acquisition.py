@@ -9,7 +9,7 @@ The path of a block::
 from collections.abc import Callable, Mapping
 
 from daq.adapter import RawBlock, picked
-from daq.clock import DeviceClock, host_offset_ns
+from daq.clock import SLOWER, DeviceClock, host_offset_ns
 from daq.conditioning import Conditioner
 from daq.sequence import Hole, Restart, SequenceTracker
 from daq.watch import Link, Watch
@@ -84,6 +84,7 @@ class Acquisition:
             "drift_ppm": self.clock.drift_ppm,
             "certain_drift_ppm": self.clock.certain_drift_ppm,
             "clock_jumps": self.clock.jumps,
+            "stamps_ahead_s": self.clock.ahead_s,
         }
         return [*stepped, *self.watch.tick(now_ns, self.clock.unix_ns(now_ns), link, figures)]
 
@@ -92,10 +93,15 @@ class Acquisition:
         return self.watch.silent_in(now_ns)
 
     def _wall_clock_step(self, now_ns: int) -> list[Message]:
-        step = self.clock.follow(self._host_offset_ns())
+        step = self.clock.follow(self._host_offset_ns(), now_ns)
         if step == 0.0:
             return []
         text = f"the host's clock was stepped by {step:+.3f} s"
+        if ahead := self.clock.ahead_s:
+            slower = f"lose {1e3 * SLOWER:g} ms a second until they are right"
+            text += f"; stamps are {ahead:.3f} s ahead and {slower}"
+        elif step < 0.0:
+            text += "; stamps are set back with it"
         return [self._event(now_ns, "warning", "clock_step", text)]
 
     def _samples(self, run: RawBlock) -> list[Message]:

@@ -40,6 +40,13 @@ _USUAL_DRIFT = 1e-3
 """Standard deviation of a drift that is not measured yet."""
 _JUMP_PERIODS = 2.5
 _WALL_STEP_NS = 500_000_000
+MOST_AHEAD_NS = 120_000_000_000
+"""How far stamps may be ahead of the host's clock after it was set back [ns]; further, they are set
+back too."""
+SLOWER = 5e-4
+"""By which share stamps run slower until they are right again: hardly a drift."""
+_SLOWER_FOR_NS = 100_000_000
+"""Longest time that counts so at once [ns]: samples that waited keep their distances."""
 
 
 class _Line(NamedTuple):
@@ -69,7 +76,7 @@ class _Place(NamedTuple):
 
 
 class DeviceClock:
-    """Unix time of samples, strictly increasing.
+    """Unix time of samples, strictly increasing unless the host's clock is set far back.
 
     Args:
         rate: nominal sample rate [Hz].
@@ -91,7 +98,7 @@ class DeviceClock:
         self._period_us = 1e6 / rate
         self._ns_per_us = 1000.0 / clock_rate
         self._unix_ns = self._wall_ns = unix_minus_monotonic_ns
-        self._last_ns = 0
+        self._followed_ns = self._last_ns = 0
         self._last: tuple[int, int] | None = None
         self.restart()
         nothing = np.zeros((3, 0), np.int64)
@@ -146,17 +153,34 @@ class DeviceClock:
         self._last_ns = max(self._last_ns + 1, self._unix_ns + self._host_ns(us))
         return jumped
 
-    def follow(self, unix_minus_monotonic_ns: int) -> float:
+    def follow(self, unix_minus_monotonic_ns: int, monotonic_ns: int) -> float:
         """Step of the host's wall clock since the last call [s], 0 if there was none.
 
-        A step forward is followed. A step back is not: time in a recording only moves forward.
+        A step forward is followed at once. After a step back stamps are ahead: they run slower
+        until they are right again, or are set back, once, if that would take more than days.
         """
+        since_ns = monotonic_ns - self._followed_ns
+        self._followed_ns = monotonic_ns
         step = unix_minus_monotonic_ns - self._wall_ns
         if abs(step) < _WALL_STEP_NS:
+            slower_ns = round(SLOWER * min(max(since_ns, 0), _SLOWER_FOR_NS))
+            self._unix_ns -= min(slower_ns, self._ahead_ns)
             return 0.0
         self._wall_ns = unix_minus_monotonic_ns
-        self._unix_ns = max(self._unix_ns, unix_minus_monotonic_ns)
+        if self._ahead_ns > MOST_AHEAD_NS:
+            self._last_ns -= self._ahead_ns
+            self._unix_ns = self._wall_ns
+        self._unix_ns = max(self._unix_ns, self._wall_ns)
         return step * 1e-9
+
+    @property
+    def ahead_s(self) -> float:
+        """How far stamps are ahead of the host's clock, since it was set back [s]."""
+        return self._ahead_ns * 1e-9
+
+    @property
+    def _ahead_ns(self) -> int:
+        return self._unix_ns - self._wall_ns
 
     def unix_ns(self, monotonic_ns: int) -> int:
         """Unix time of a moment on the host's monotonic clock [ns]."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigwatch.wire.errors import ConfigError, RigwatchError
-from rigwatch.wire.host import Heartbeat, set_at_signal
+from rigwatch.wire.host import Heartbeat, set_at_signal, unless_ended
 from rigwatch.wire.rig_config import PlantSection, RigConfig, load_rig, section_or_error
 from sim_plant.effects import CHANNELS, EFFECTS
 from sim_plant.scenario import ScenarioRun, load_scenario
@@ -41,7 +41,7 @@ def serve(config: RigConfig, plant: PlantSection, stop: threading.Event) -> None
     if rate != config.rig.sample_rate:
         expected = f"{config.rig.sample_rate} Hz as in rig.sample_rate"
         raise ConfigError(plant.scenario, "plant.sample_rate", f"{rate} Hz", expected)
-    run = ScenarioRun(scenario, plant.seed)
+    run = unless_ended(stop, lambda: ScenarioRun(scenario, plant.seed))
     controlled = Controlled(run, run.rig)
     device, faults = Device(controlled), LineFaults(plant.seed)
     neutral = {name: effect.neutral for name, effect in EFFECTS.items()}

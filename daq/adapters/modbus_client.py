@@ -7,8 +7,7 @@ are checked, nothing is retried and every wait has a timeout.
 import contextlib
 import logging
 import os
-import select
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import serial
@@ -20,6 +19,7 @@ from daq.adapters.identification import Identification, NoIdentificationError, O
 from daq.adapters.modbus_poll import ModbusAdapter, RefusedError
 from daq.adapters.serial_line import first_that_opens
 from rigwatch.wire.errors import DeviceError, ModbusError
+from rigwatch.wire.host import ready_to_read, write_within
 from rigwatch.wire.rig_config import ChannelSection, ModbusRtuSection, ModbusSection
 
 logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
@@ -37,6 +37,7 @@ _CODES = {
 _REPEATABLE = (5, 6)
 _NONE_THERE = (1, 2, 3)
 """Exception codes of a device that has no identification; after others it may be asked again."""
+_CHUNK = 4096
 _ALL_OBJECTS, _MOST_ANSWERS = 3, 8
 """Read code for basic, regular and extended objects; answers over which they may be divided."""
 
@@ -142,8 +143,27 @@ def _as_text(value: bytes | list[bytes]) -> str:
     return " ".join(part.decode("utf-8", "replace") for part in parts).strip()
 
 
+class _TcpClient(ModbusTcpClient):
+    """A client whose connection may have any descriptor."""
+
+    def recv(self, size: int | None) -> bytes:
+        """The bytes available now or before the timeout; empty if there are none."""
+        if self.socket is None:
+            raise ConnectionException(str(self))
+        if not ready_to_read((self.socket.fileno(),), self.comm_params.timeout_connect or 0.0):
+            return b""
+        data: bytes = self.socket.recv(size or _CHUNK)
+        if not data:
+            self.close()  # type: ignore[no-untyped-call]
+            raise ConnectionException(str(self))
+        return data
+
+
 class _RtuClient(ModbusSerialClient):
-    """A serial client that waits for bytes instead of polling every millisecond."""
+    """A serial client that waits for bytes instead of polling every millisecond.
+
+    pyserial waits for each write, which no descriptor above 1023 survives, and for ever.
+    """
 
     def open_port(self) -> None:
         """Open the port exclusively; errors are the operating system's."""
@@ -152,21 +172,40 @@ class _RtuClient(ModbusSerialClient):
             params.host, params.baudrate, timeout=params.timeout_connect, exclusive=True
         )
 
+    def send(self, request: bytes, addr: object = None) -> int:  # noqa: ARG002 (of the base)
+        """Send a request; drops what has come of an earlier one."""
+        descriptor = self._descriptor()
+        with self._closed_if_lost():
+            if ready_to_read((descriptor,), 0.0) and not os.read(descriptor, _CHUNK):
+                raise EOFError
+            return write_within(descriptor, request, self._timeout)
+
     def recv(self, size: int | None) -> bytes:
         """The bytes available now or before the timeout; empty if there are none."""
+        descriptor = self._descriptor()
+        with self._closed_if_lost():
+            if not ready_to_read((descriptor,), self._timeout):
+                return b""
+            if data := os.read(descriptor, size or _CHUNK):
+                return data
+            raise EOFError
+
+    @property
+    def _timeout(self) -> float:
+        return self.comm_params.timeout_connect or 0.0
+
+    def _descriptor(self) -> int:
         if self.socket is None:
             raise ConnectionException(str(self))
+        return int(self.socket.fileno())
+
+    @contextlib.contextmanager
+    def _closed_if_lost(self) -> Iterator[None]:
         try:
-            fd = self.socket.fileno()
-            ready, _, _ = select.select([fd], [], [], self.comm_params.timeout_connect)
-            data = os.read(fd, size or 512) if ready else None
-        except (OSError, serial.SerialException):
-            data = b""
-        if data == b"":
-            self.socket.close()
-            self.socket = None
-            raise ConnectionException(str(self))
-        return data or b""
+            yield
+        except (OSError, EOFError):
+            self.close()  # type: ignore[no-untyped-call]
+            raise ConnectionException(str(self)) from None
 
 
 def tcp(section: ModbusSection, channels: tuple[ChannelSection, ...]) -> ModbusAdapter:
@@ -174,7 +213,7 @@ def tcp(section: ModbusSection, channels: tuple[ChannelSection, ...]) -> ModbusA
     where = f"{section.host}:{section.port}"
 
     def make() -> Any:
-        client: Any = ModbusTcpClient(
+        client: Any = _TcpClient(
             section.host, port=section.port, timeout=section.timeout, retries=0
         )
         if not client.connect():

@@ -2,14 +2,13 @@
 
     port (device file or glob) ── SerialPort ──bytes──▶ FrameDecoder ──frames──▶ RawBlock
 
-The port is watched with `select`, so that a frame is passed on as soon as its last byte arrives.
+The port is waited for, so that a frame is passed on as soon as its last byte arrives.
 A test passes its own transport.
 """
 
 import errno
 import glob
 import os
-import select
 import time
 from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
@@ -22,6 +21,7 @@ from daq.adapter import DeviceBusyError, RawBlock
 from daq.adapters.frame_run import read_run
 from rigwatch.wire.device import Frame, FrameDecoder
 from rigwatch.wire.errors import DeviceError
+from rigwatch.wire.host import ready_to_read
 from rigwatch.wire.rig_config import ChannelSection, SerialSection
 
 _CHUNK = 4096
@@ -75,8 +75,7 @@ class SerialPort:
             raise DeviceError(f"{self.port} is not open")
         try:
             fd = self._serial.fileno()
-            ready, _, _ = select.select([fd], [], [], timeout)
-            data = os.read(fd, _CHUNK) if ready else None
+            data = os.read(fd, _CHUNK) if ready_to_read((fd,), timeout) else None
         except BlockingIOError:
             return b""
         except OSError as error:

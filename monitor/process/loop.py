@@ -62,6 +62,7 @@ from rigwatch.wire.host import (
     raise_priority,
     set_at_signal,
     tidy_memory,
+    unless_ended,
 )
 from rigwatch.wire.messages import (
     ALARMS,
@@ -500,7 +501,8 @@ def run(path: Path | str) -> int:
     """
     stop = set_at_signal()
     config = load_rig(path)
-    model = prepared(config, path)  # before joining: a monitor that is visible there is ready
+    # Before joining: a monitor that is visible there is ready.
+    model = unless_ended(stop, lambda: prepared(config, path))
     raise_priority(MONITOR)
     with joined(config, "monitor", stop) as bus:
         if bus is not None:

@@ -3,12 +3,13 @@
 Samples and operators' commands carry Unix time, of clocks that may be set, on one machine or two:
 
     machine's clock set forward     followed, as the samples' times do
-    set back                        not followed, as the samples' times only move forward
+    set back                        not followed, as the samples' times move forward
     samples ahead of the machine    the samples' time, continued by the monotonic clock
     samples behind it               the machine's: a monitor that catches up reads old samples
 
-So it goes back only with the samples, when daq starts again. What lasts then ends as much sooner;
-after a step forward it ends early, as after a night in which the machine slept.
+So it goes back only with the samples, when daq starts again or they were minutes ahead. What lasts
+then ends as much sooner; after a step forward it ends early, as after a night in which the machine
+slept.
 """
 
 APART_NS = 60_000_000_000

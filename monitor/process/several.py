@@ -39,11 +39,12 @@ from rigwatch.wire.host import (
     raise_priority,
     set_at_signal,
     tidy_memory,
+    unless_ended,
     waits_of,
 )
 from rigwatch.wire.messages import SampleBlock, pieces
 from rigwatch.wire.rig_config import RigConfig, load_rig
-from rigwatch.wire.several_rigs import check_own, valid_rigs
+from rigwatch.wire.several_rigs import Rigs, check_own, valid_rigs
 
 TURN = 0.005
 """Time from one turn to the next: samples wait for half of it on average [s]."""
@@ -311,8 +312,7 @@ def run_several(paths: list[Path]) -> int:
     stop = set_at_signal()
     loaded = valid_rigs(paths)  # a wrong file is named by its rig's seat
     check_own("monitor.journal", _journals(loaded))
-    for path, config in loaded:
-        _prepare(path, config)
+    unless_ended(stop, lambda: _prepare(loaded))
     raise_priority(MONITOR)
     heartbeat = Heartbeat("monitor")
     prepare_for_real_time()
@@ -328,13 +328,14 @@ def run_several(paths: list[Path]) -> int:
     return 0
 
 
-def _prepare(path: Path, config: RigConfig) -> None:
-    """Compile what the rig needs before any is watched; its seat says what is wrong with it."""
-    with contextlib.suppress(RigwatchError):
-        prepared(config, path)
+def _prepare(loaded: Rigs) -> None:
+    """Compile what the rigs need before any is watched; a seat says what is wrong with its rig."""
+    for path, config in loaded:
+        with contextlib.suppress(RigwatchError):
+            prepared(config, path)
 
 
-def _journals(loaded: list[tuple[Path, RigConfig]]) -> Iterable[tuple[Path, str]]:
+def _journals(loaded: Rigs) -> Iterable[tuple[Path, str]]:
     for path, config in loaded:
         if config.monitor and config.monitor.journal:
             yield path, str(Path(config.monitor.journal).resolve())

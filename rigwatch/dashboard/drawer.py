@@ -7,6 +7,7 @@ survives the viewer in which it was shown.
 import copy
 import threading
 import time
+from dataclasses import replace
 
 import rerun as rr
 
@@ -16,6 +17,8 @@ from rigwatch.dashboard.feed import Feed
 _FLUSH_TIMEOUT = 5.0
 _SHELF_EVERY = 5.0
 """Time between questions for the shelved alarms [s]."""
+LEAST = 10.0
+"""Shortest recording before another one is begun [s]: two sources may send in turns."""
 
 
 class Drawer:
@@ -49,16 +52,20 @@ class Drawer:
 
     def _run(self) -> None:
         try:
-            self._draw()
+            while not self._stop.is_set():
+                self._draw()
         except Exception as error:
             self.failure = error
 
     def _draw(self) -> None:
+        """Draw one recording: until asked to end, or until the clock was set back."""
+        began = time.monotonic()
         stream = rr.RecordingStream(APPLICATION, recording_id=f"{self.facts.rig}-{time.time_ns()}")
         stream.connect_grpc(self._url)
         dashboard = Dashboard(stream, self.facts)
+        now_ns = time.time_ns()
         for alarm in self._feed.standing() or self.facts.book.standing():
-            dashboard.show(alarm)
+            dashboard.show(replace(alarm, t_ns=min(alarm.t_ns, now_ns)))
         ask_at = 0.0
         while not self._stop.wait(max(0.0, self._period - self.held_for)):
             self._turned_at = time.monotonic()
@@ -73,4 +80,6 @@ class Drawer:
             dashboard.flush(time.time_ns())
             # Waiting for each update's data bounds the backlog of a viewer that accepts none.
             stream.flush(timeout_sec=_FLUSH_TIMEOUT)
+            if dashboard.set_back and time.monotonic() - began > LEAST:
+                break
         stream.disconnect()

@@ -19,6 +19,7 @@ from rigwatch.recorder.positions import PositionFile, Positions
 from rigwatch.recorder.remote_feed import RemoteFeed
 from rigwatch.recorder.resuming import of_living
 from rigwatch.recorder.retention import Retention
+from rigwatch.recorder.retention_rules import AgeClock
 from rigwatch.recorder.session_length import SessionLength
 from rigwatch.recorder.store import Store
 from rigwatch.recorder.thinning import Thinning
@@ -74,7 +75,7 @@ class Recorder:
         self._bus, self._run = bus, run
         self._length = SessionLength(self.settings.session_days, age_of(place.folder, run))
         self._settled = self._noted = 0
-        self._disk = DiskWatch()
+        self._disk, self._ages = DiskWatch(), AgeClock()
         self._retention = Retention(self.settings, config.rig.id)
         self._thinning = Thinning(self.settings, config.rig.id)
         self._told_at = -HEALTH_EVERY
@@ -96,11 +97,17 @@ class Recorder:
         self._tell(self._disk.update(share, t_ns))
         due = now - self._told_at >= HEALTH_EVERY
         if due:
-            self._tell(self._retention.update(now, t_ns, self.store.folder))
-            self._tell(self._thinning.update(now, t_ns))
+            self._tell(self._removed(now, t_ns))
         if due or self._trouble() != self._told_trouble:
             self._told_at, self._told_trouble = now, self._trouble()
             self._bus.publish(HEALTH, self._health(share, t_ns))
+
+    def _removed(self, now: float, t_ns: int) -> list[Event]:
+        """Remove and thin what is old, and report it."""
+        aged_ns = self._ages.now_ns(now, t_ns)
+        said = self._retention.update(now, aged_ns, self.store.folder)
+        said += self._thinning.update(now, aged_ns)
+        return [replace(event, t_ns=t_ns) for event in said]
 
     def _trouble(self) -> tuple[bool, int]:
         """What is wrong with the disk; a change is reported at once."""

@@ -53,7 +53,7 @@ class Retention:
 
         Args:
             now: monotonic time [s].
-            t_ns: Unix time [ns].
+            t_ns: Unix time by which ages count [ns].
             current: folder being recorded to; its newest segment is kept.
         """
         if now < self._due:

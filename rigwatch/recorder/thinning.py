@@ -52,7 +52,7 @@ class Thinning:
 
         Args:
             now: monotonic time [s].
-            t_ns: Unix time [ns].
+            t_ns: Unix time by which ages count [ns].
         """
         if not self._words:
             return []
@@ -61,7 +61,7 @@ class Thinning:
             if now < self._due:
                 return []
             try:
-                self._start(now)
+                self._start(now, t_ns)
             except OSError as error:
                 self._due = now + EVERY
                 return self._failed(str(error), t_ns)
@@ -77,11 +77,11 @@ class Thinning:
             end_process(self._process, STOP_TIMEOUT)
             self._process = None
 
-    def _start(self, now: float) -> None:
+    def _start(self, now: float, t_ns: int) -> None:
         self._began = now
         self._said, self._erred = TemporaryFile(), TemporaryFile()  # noqa: SIM115 -- of the process
         self._process = subprocess.Popen(
-            self._words,
+            (*self._words, "--now", f"{t_ns / 1e9:.3f}"),
             stdin=subprocess.DEVNULL,
             stdout=self._said,
             stderr=self._erred,

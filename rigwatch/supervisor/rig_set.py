@@ -5,7 +5,6 @@ file of a rig ─▶ removed           ─▶ its rig leaves     ├▶ the supe
 file of a rig ─▶ section more, less ─▶ a process more, less /
 """
 
-import stat
 import time
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
@@ -16,6 +15,7 @@ from rigwatch.supervisor.settled_file import SettledFile
 from rigwatch.supervisor.several import plan_several
 from rigwatch.supervisor.supervisor import Supervisor
 from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.host import may_be_file
 from rigwatch.wire.rig_config import RigConfig, load_rig
 from rigwatch.wire.several_rigs import Rigs, valid_rigs
 
@@ -58,7 +58,7 @@ class RigSet:
         if now - self._checked_at < INTERVAL or len(self._paths) == 1:
             return
         self._checked_at = now
-        self._there |= {path: now for path in self._paths if _is_there(path)}
+        self._there |= {path: now for path in self._paths if may_be_file(path)}
         for path in self._paths:
             if path in self._wrong:
                 self._join(path)
@@ -101,16 +101,6 @@ class RigSet:
 
     def _plans(self) -> list[ProcessPlan]:
         return planned(self._paths, list(self._rigs.items()), self._without)
-
-
-def _is_there(path: Path) -> bool:
-    """Whether there is such a file, as far as can be told: a share may not answer for a while."""
-    try:
-        return stat.S_ISREG(path.stat().st_mode)
-    except (FileNotFoundError, NotADirectoryError):
-        return False
-    except OSError:
-        return True
 
 
 def planned(paths: Sequence[Path], rigs: Rigs, without: Collection[str]) -> list[ProcessPlan]:

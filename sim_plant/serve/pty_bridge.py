@@ -3,11 +3,11 @@
 import contextlib
 import os
 import pty
-import select
 import threading
 import tty
 from pathlib import Path
 
+from rigwatch.wire.host import ready_to_read
 from sim_plant.serve.pty_line import PtyLine
 
 
@@ -51,7 +51,7 @@ class PtyBridge:
                 # A line that no process has open is always readable: retry later.
                 self._to_reader(0.02)
                 continue
-            ready, _, _ = select.select([self._master, self.line.fileno()], [], [], 0.1)
+            ready = ready_to_read((self._master, self.line.fileno()), 0.1)
             if self._master in ready:
                 self._to_reader(0.0)
             if self.line.fileno() in ready:
@@ -59,7 +59,6 @@ class PtyBridge:
                     os.write(self._master, self.line.read())
 
     def _to_reader(self, timeout: float) -> None:
-        ready, _, _ = select.select([self._master], [], [], timeout)
-        if ready:
+        if ready_to_read((self._master,), timeout):
             with contextlib.suppress(OSError):
                 self.line.write(os.read(self._master, 4096))

@@ -90,7 +90,8 @@ def test_estimates_that_wait_together_are_one_block_up_to_a_gap_and_invalid_ones
     def publish(seqs: range) -> None:
         for seq in seqs:
             values = np.array([seq, -seq], float)
-            block = EstimateBlock("rig", 7, 2 * seq, np.array([3, 4]), (Column("x", "", values),))
+            times = 2 * seq + np.array([3, 4])
+            block = EstimateBlock("rig", 7, 2 * seq, times, (Column("x", "", values),))
             monitor.publish(ESTIMATES, block)
 
     publish(range(3))

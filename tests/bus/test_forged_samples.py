@@ -1,11 +1,13 @@
 """What a stranger sends in a boot's name: dropped, counted, told, while the real samples come."""
 
+import time
 from collections.abc import Callable
 
 import pytest
 
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
-from rigwatch.wire.delivery.ring import SampleRing
+from rigwatch.wire.delivery import sample_reader
+from rigwatch.wire.delivery.ring import SOURCE_KEY, SampleRing
 from rigwatch.wire.delivery.sample_reader import SampleReader
 from rigwatch.wire.messages import SAMPLES, Event, SampleBlock
 from rigwatch.wire.ordering.outcomes import FORGED, POSITION_WRONG, Loss
@@ -178,3 +180,101 @@ def test_a_loss_by_a_wrong_position_is_of_unknown_length() -> None:
             losses += [one for one in found if isinstance(one, Loss)]
             bench.take([one for one in found if not isinstance(one, Loss)])
     assert [loss.last - loss.first for loss in losses] == [-1]
+
+
+@pytest.fixture
+def soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A source that came first and is silent is passed over soon."""
+    monkeypatch.setattr(sample_reader, "UNSURE", 0.3)
+
+
+class Strangers:
+    """A rig's daq, a stranger with a token of an early start, and a reader that begins later."""
+
+    def __init__(self, boot: int) -> None:
+        network = MemoryNetwork()
+        self.daq, self.eve = network.bus("bench", "daq"), network.bus("bench", "eve")
+        self.token = self.eve.named_token(SOURCE_KEY)
+        self.token.declare(f"{boot}/1")
+        self.ring, self.sent = SampleRing(self.daq, 65536), 0
+        self.send()
+        self.reader = SampleReader(network.bus("bench", "reader"))
+        self.items: list[object] = []
+
+    def send(self) -> None:
+        """Four samples of the device."""
+        part = block(self.sent, 4)
+        self.ring.add(part)
+        self.daq.publish(SAMPLES, part)
+        self.sent += 4
+
+    def reads(self) -> bool:
+        """Whether the newest of the device's samples are read."""
+        self.send()
+        self.items.extend(self.reader.read(0.01))
+        return self.reader.position == (7, self.sent - 1)
+
+    def codes(self) -> list[str]:
+        return [item.code for item in self.items if isinstance(item, Event)]
+
+
+@pytest.mark.parametrize("boot", [7, 9])
+@pytest.mark.usefixtures("soon")
+def test_a_stranger_who_says_that_he_came_first_and_is_silent_keeps_no_reader_away(
+    boot: int,
+) -> None:
+    bench = Strangers(boot)
+    assert wait_until(bench.reads, 10.0, 0.01)
+    assert bench.codes().count("DUPLICATE SOURCE") == 1
+    assert bench.reader.contested
+    bench.eve.publish(SAMPLES, block(BILLION, 4, boot=boot))
+    assert wait_until(bench.reads, 10.0, 0.01)
+    assert bench.reader.counters.lost == 0
+    assert all(is_intact(item) for item in bench.items if isinstance(item, SampleBlock))
+    bench.token.close()
+    time.sleep(sample_reader.CONTESTED + 0.1)
+    bench.reads()
+    assert not bench.reader.contested
+    bench.reader.close()
+
+
+@pytest.mark.parametrize("boot", [7, 9])
+def test_one_that_came_first_is_waited_for_as_long_as_its_token_may_outlive_it(boot: int) -> None:
+    bench = Strangers(boot)
+    assert not wait_until(bench.reads, 2.0, 0.05)
+    assert bench.reader.silent_for() > 1.5, "what is not read is not heard"
+    bench.token.close()
+    assert wait_until(bench.reads, 10.0, 0.01)
+    assert bench.codes() == ["JOINED"]
+    assert not bench.reader.contested
+    bench.reader.close()
+
+
+@pytest.mark.usefixtures("soon")
+def test_an_owner_that_was_heard_is_never_passed_over() -> None:
+    bench = Strangers(9)
+    bench.token.close()
+    assert wait_until(bench.reads, 10.0, 0.01)
+    bench.token.declare("7/1")
+    forged = block(bench.sent, 4)
+    forged.channels[0].values[:] = -1.0
+    deadline = time.monotonic() + 1.0
+    while time.monotonic() < deadline:
+        bench.eve.publish(SAMPLES, forged)
+        bench.items.extend(bench.reader.read(0.02))
+    assert wait_until(bench.reads, 10.0, 0.01)
+    assert "DUPLICATE SOURCE" in bench.codes()
+    assert all(is_intact(item) for item in bench.items if isinstance(item, SampleBlock))
+    bench.reader.close()
+
+
+def test_a_token_that_returns_with_the_router_is_its_owner_s_before_a_stranger_s() -> None:
+    owners = Owners()
+    owners.appeared(7, 100, "daq")
+    assert owners.admits(7, "daq")
+    owners.vanished(7, 100)
+    owners.appeared(7, 1, "eve")
+    assert not owners.admits(7, "daq")
+    owners.appeared(7, 100, "daq")
+    assert owners.admits(7, "daq")
+    assert not owners.admits(7, "eve")

@@ -10,6 +10,7 @@ from daq.acquisition import LONGEST_BLOCK, Acquisition
 from daq.adapter import RawBlock
 from daq.watch import Link
 from rigwatch.wire.bus import MAX_PAYLOAD
+from rigwatch.wire.messages import continues, merged
 from rigwatch.wire.messages.message_types import Event, Health, SampleBlock
 from rigwatch.wire.messages.protobuf import decode, encode
 from tests.daq.rig import codes_of, config_of
@@ -69,6 +70,27 @@ def test_a_step_of_the_host_clock_is_reported_and_time_goes_on() -> None:
     assert isinstance(before, SampleBlock)
     assert isinstance(after, SampleBlock)
     assert after.t_ns[0] - before.t_ns[0] == pytest.approx(SECOND / 256, abs=1e4)
+
+
+def test_stamps_that_were_far_ahead_come_back_are_told_and_lie_in_blocks_of_their_own() -> None:
+    acquiring, offset = acquisition()
+    (first,) = acquiring.update(raw_of(0, 1))
+    offset[0] = 3600 * SECOND
+    acquiring.tick(1, UP, {})
+    (ahead,) = acquiring.update(raw_of(1, 1))
+    offset[0] = SECOND
+    said = acquiring.tick(SECOND, UP, {})
+    (text,) = [one.text for one in said if isinstance(one, Event) and one.code == "clock_step"]
+    assert "set back with it" in text
+    assert [one.counters["stamps_ahead_s"] for one in said if isinstance(one, Health)] == [0.0]
+    (after,) = acquiring.update(raw_of(2, 1))
+    assert isinstance(first, SampleBlock)
+    assert isinstance(ahead, SampleBlock)
+    assert isinstance(after, SampleBlock)
+    assert after.t_ns[0] - first.t_ns[0] == pytest.approx(2 * SECOND / 256, abs=1e4)
+    assert continues(first, ahead)
+    assert not continues(ahead, after)
+    assert [len(one) for one in merged([first, ahead, after], 100)] == [2, 1]
 
 
 def test_a_host_clock_that_is_set_forward_makes_no_slow_device() -> None:

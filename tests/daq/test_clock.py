@@ -1,15 +1,19 @@
 """Device time on host time: drift, jumps, late arrivals and the host's own clock."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from daq.adapter import RawBlock
-from daq.clock import DeviceClock
+from daq.clock import SLOWER, DeviceClock
+from rigwatch.wire.arrays import IntArray
 
 PERIOD_NS = 1e9 / 256
 UNIX_NS = 1_700_000_000_000_000_000
+SECOND = 1_000_000_000
 
 
 def run_of(count: int, first: int = 0, drift: float = 0.0, late_ns: object = 0) -> RawBlock:
@@ -109,14 +113,55 @@ def test_a_replay_at_ten_times_the_speed_has_no_drift() -> None:
     assert stamps[-1] - stamps[0] == pytest.approx(4e9, rel=1e-2)
 
 
-def test_the_wall_clock_is_followed_forward_only() -> None:
+def test_a_step_of_the_wall_clock_is_followed_forward_at_once_and_back_slowly() -> None:
     clock = DeviceClock(256.0, unix_minus_monotonic_ns=UNIX_NS)
-    assert clock.follow(UNIX_NS + 1000) == 0.0
-    assert clock.follow(UNIX_NS - 30_000_000_000) == pytest.approx(-30.0)
+    assert clock.follow(UNIX_NS + 1000, 0) == 0.0
+    assert clock.follow(UNIX_NS - 30 * SECOND, 1) == pytest.approx(-30.0)
     assert clock.unix_ns(5) == UNIX_NS + 5
-    assert clock.follow(UNIX_NS - 30_000_000_000) == 0.0
-    assert clock.follow(UNIX_NS + 10_000_000_000) == pytest.approx(40.0)
-    assert clock.unix_ns(5) == UNIX_NS + 10_000_000_005
+    assert clock.ahead_s == pytest.approx(30.0)
+    assert clock.follow(UNIX_NS - 30 * SECOND, SECOND // 50) == 0.0
+    assert clock.unix_ns(5) == pytest.approx(UNIX_NS + 5 - SLOWER * SECOND / 50, abs=2)
+    assert clock.follow(UNIX_NS + 10 * SECOND, SECOND // 20) == pytest.approx(40.0)
+    assert clock.unix_ns(5) == UNIX_NS + 10 * SECOND + 5
+    assert clock.ahead_s == 0.0
+
+
+def stamps_while(clock: DeviceClock, offset: Callable[[float], int], seconds: int) -> IntArray:
+    """Stamps of samples while the host's clocks differ by `offset` at a time [s]; looked at each
+    sixteenth of a second.
+    """
+    found = []
+    for k in range(16 * seconds):
+        clock.follow(offset(k / 16), k * SECOND // 16)
+        found.append(clock.stamp(run_of(16, first=16 * k))[0])
+    return np.concatenate(found)
+
+
+def test_after_a_step_back_stamps_run_slower_until_they_are_right() -> None:
+    clock = DeviceClock(256.0, unix_minus_monotonic_ns=UNIX_NS)
+    ahead, seconds = 0.6, 1400
+    back = UNIX_NS - round(ahead * SECOND)
+    stamps = stamps_while(clock, lambda at: UNIX_NS if at < 60 else back, seconds)
+    steps = np.diff(stamps)
+    assert steps.min() > 0.99 * PERIOD_NS
+    assert steps.max() < 1.01 * PERIOD_NS
+    late = stamps - UNIX_NS - np.arange(len(stamps)) * PERIOD_NS
+    assert late[256 * 600] / SECOND == pytest.approx(-540 * SLOWER, abs=0.01)
+    assert late[-1] / SECOND == pytest.approx(-ahead, abs=1e-3)
+    assert clock.ahead_s == 0.0
+
+
+def test_stamps_come_back_from_a_clock_that_was_far_ahead_for_a_while() -> None:
+    clock = DeviceClock(256.0, unix_minus_monotonic_ns=UNIX_NS)
+    wrong = UNIX_NS + 3600 * SECOND
+    stamps = stamps_while(clock, lambda at: wrong if 20 <= at < 40 else UNIX_NS, 60)
+    steps = np.diff(stamps)
+    (back,) = np.flatnonzero(steps < 0)
+    assert steps[back] == pytest.approx(-3600 * SECOND, abs=2 * PERIOD_NS)
+    assert back == 40 * 256 - 1
+    error = stamps - UNIX_NS - np.arange(len(stamps)) * PERIOD_NS
+    assert np.abs(error[40 * 256 :]).max() < PERIOD_NS
+    assert clock.ahead_s == 0.0
 
 
 @pytest.mark.parametrize("clock_rate", [1.0, 10.0])

@@ -112,6 +112,8 @@ def test_a_base_that_is_wrong_is_named(base, overlay):
     assert "there is no" in str(error)
     assert "a file that does not lead back" in str(refusal(overlay('base = "seven.toml"\n')))
     assert "the path of a file" in str(refusal(overlay("base = 3\n")))
+    long = refusal(overlay(f'base = "{"x" * 300}.toml"\n'))
+    assert (long.key, "file name too long" in str(long)) == ("base", True)
     base.write_text("[rig\n")
     assert Path(refusal(overlay(OWN)).file).name == "base.toml"
 

@@ -28,6 +28,7 @@ def test_what_was_recorded_long_ago_is_thinned_while_the_recording_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(thinning, "FIRST", 0.0)
+    monkeypatch.setattr(thinning, "EVERY", 1.0)
     days = Days(
         configured(tmp_path, "session_days = 1.0\nthin_days = 1e-9\nthin_alarm_days = 1e-9")
     )
@@ -61,18 +62,18 @@ def test_a_trouble_that_lasts_is_told_once(tmp_path: Path, monkeypatch: pytest.M
     thins, now, told = Thinning(settings, "bench1"), 0.0, list[Event]()
 
     def ended() -> bool:
-        told.extend(thins.update(now, 1))
+        told.extend(thins.update(now, time.time_ns()))
         return thins._process is None
 
     with one_writer(Store(str(tmp_path))):
         for _ in range(3):
-            thins.update(now, 1)
+            thins.update(now, time.time_ns())
             eventually(ended, "a process has ended")
             now += thinning.EVERY
     assert [one.code for one in told] == ["THINNING_FAILED"]
     assert "expected one at a time" in told[0].text
     assert old.exists()
-    thins.update(now, 1)
+    thins.update(now, time.time_ns())
     eventually(ended, "the last has ended")
     assert told[-1].code == "RECORDING_THINNED"
     assert not old.exists()

@@ -14,6 +14,7 @@ from rigwatch.commands.sessions.replay import Announcer
 from rigwatch.replay.run import judge
 from rigwatch.replay.source import items
 from rigwatch.wire.bus import command_mark
+from rigwatch.wire.messages import cut
 from rigwatch.wire.messages.message_types import (
     Alarm,
     AlarmCommand,
@@ -102,6 +103,29 @@ def test_operators_commands_fall_between_the_same_samples_however_it_is_cut() ->
                 break
             before += len(item)
         assert before == 1000 - 4
+
+
+@pytest.mark.parametrize("back_s", [0, 3600])
+@pytest.mark.parametrize("size", [7, 4096])
+def test_a_model_change_falls_before_its_sample_wherever_the_clock_was_set(
+    tmp_path: Path, back_s: int, size: int
+) -> None:
+    path, (block,) = tmp_path / "set.mcap", open_session(FRICTION).samples()
+    first, second = cut(block, 0, 1000), cut(block, 1000, len(block))
+    with SessionWriter(path, run_info("simulated", 256.0)) as writer:
+        writer.write(first)
+        writer.write(replace(second, t_ns=second.t_ns - back_s * 10**9))
+        for seq, t_ns in ((1000, first.t_ns[-1] + 1), (1500, block.t_ns[1500] - back_s * 10**9)):
+            writer.write(ModelChange(block.device, block.boot, seq, int(t_ns), "ann", "", "", ""))
+    found: list[tuple[int, int]] = []
+    samples = 0
+    for item in items(open_session(path), size=size):
+        if isinstance(item, SampleBlock):
+            samples += len(item)
+        elif isinstance(item, ModelChange):
+            found.append((item.seq, samples))
+    assert found == [(1000, 1000), (1500, 1500)]
+    assert samples == len(block)
 
 
 def changed(tmp_path: Path, rate: float = 256.0, channels: slice = slice(None)) -> str:

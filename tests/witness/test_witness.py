@@ -6,11 +6,13 @@ from itertools import count
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from rigwatch.wire.access import signer_of
-from rigwatch.wire.bus import CommandCheck, ask_alarm_list
+from rigwatch.wire.bus import SAID_KEY, CommandCheck, ask_alarm_list
 from rigwatch.wire.bus.commands.command_check import signed
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.bus.tokens.names import said
 from rigwatch.wire.messages import (
     ALARMS,
     ESTIMATES,
@@ -21,7 +23,7 @@ from rigwatch.wire.messages import (
     Event,
 )
 from rigwatch.wire.rig_config import SecuritySection, WitnessSection
-from rigwatch.witness.doubles import RESTART
+from rigwatch.witness.doubles import RESTART, Doubles
 from rigwatch.witness.kept_alarm import KeptAlarm
 from rigwatch.witness.process import Witness
 from rigwatch.witness.stale_alarm import StaleAlarm
@@ -150,6 +152,35 @@ def test_a_second_process_that_calls_itself_monitor_is_an_alarm_until_one_is_lef
     stranger.close()
     eventually(lambda: passes("cleared_unacknowledged"), "its end")
     assert len(said) == 2
+
+
+@pytest.mark.long
+def test_a_second_monitor_at_the_key_of_the_first_is_an_alarm_too(tmp_path: Path) -> None:
+    with TestRig(tmp_path) as rig:
+        rig.router()
+        monitor, stranger, page = (rig.bus(name) for name in ("monitor", "monitor", "page"))
+        alarms = page.listen(ALARMS)
+        doubles = Doubles(rig.bus("witness"), patience=1.0)
+        seconds = count(0)
+        assert alarms.drain() == []
+
+        def told() -> bool:
+            return bool(doubles.text(float(next(seconds))))
+
+        monitor.announce()
+        eventually(lambda: bool(page.names(f"{SAID_KEY}/monitor")), "the monitor")
+        assert not any(told() for _ in range(20))
+        (key,) = page.transport.tokens(page.key(f"{SAID_KEY}/monitor/*"), 1.0)
+        name = f"7/1/{stranger.transport.identity}"
+        ends = [
+            stranger.transport.serve(key, lambda _: [said(key, name)]),
+            stranger.transport.declare_token(key),
+        ]
+        eventually(told, "it is told")
+        for end in ends:
+            end()
+        eventually(lambda: not told(), "one is left")
+        doubles.close()
 
 
 def test_a_silence_that_is_over_stands_until_somebody_has_seen_it(tmp_path: Path) -> None:

@@ -1,12 +1,14 @@
 """`rigwatch fleet`: the state of many rigs at a glance, the worst first."""
 
 import argparse
+import contextlib
 import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigwatch.commands.common import PORT, check_folder, number, print_json, tell_address
+from rigwatch.wire.errors import SessionError, reason_of
 
 if TYPE_CHECKING:
     from rigwatch.fleet import Fleet, RigState
@@ -48,12 +50,13 @@ def run(arguments: argparse.Namespace) -> int:
 
     check_folder(arguments.page)
     fleet = Fleet(arguments.config, arguments.timeout)
+    page = _Page(arguments.page, follows=arguments.follow) if arguments.page else None
     try:
         if arguments.serve:
             return _serve(arguments, fleet)
         while True:
             states = fleet.states()
-            _show(arguments, states)
+            _show(arguments, states, page)
             if not arguments.follow:
                 return EXIT_UNWELL if any(state.rank for state in states) else 0
             time.sleep(_EVERY_S)
@@ -79,16 +82,51 @@ def _serve(arguments: argparse.Namespace, fleet: "Fleet") -> int:
     return 0
 
 
-def _show(arguments: argparse.Namespace, states: "list[RigState]") -> None:
-    from rigwatch.fleet import as_lines, as_page
+class _Page:
+    """The page of all rigs; one that is written again and again outlasts a full disk.
 
-    if arguments.page:
+    Args:
+        path: its file.
+        follows: whether it is written again.
+    """
+
+    def __init__(self, path: Path, *, follows: bool) -> None:
+        self._path, self._follows, self._why_not = path, follows, ""
+
+    def write(self, states: "list[RigState]") -> None:
+        """Write it; what keeps it from being written is told once, and that it has ended.
+
+        Raises:
+            SessionError: it cannot be written, and will not be again.
+        """
+        from rigwatch.fleet import as_page
         from rigwatch.wire.host import replace_file
 
-        text = as_page(states, every_s=_EVERY_S * arguments.follow)
-        replace_file(arguments.page, text, durable=False)
+        try:
+            text = as_page(states, every_s=_EVERY_S * self._follows)
+            replace_file(self._path, text, durable=False)
+        except OSError as error:
+            why = f"cannot be written: {reason_of(error)}"
+            if not self._follows:
+                raise SessionError(f"{self._path}: {why}") from error
+            self._tell(why, f"{why}; it is tried again every {_EVERY_S:.0f} s")
+        else:
+            self._tell("", "is written again")
+
+    def _tell(self, why_not: str, text: str) -> None:
+        before, self._why_not = self._why_not, why_not
+        if why_not != before:
+            with contextlib.suppress(OSError):  # the same disk may hold what is told
+                print(f"rigwatch: {self._path}: {text}", file=sys.stderr, flush=True)
+
+
+def _show(arguments: argparse.Namespace, states: "list[RigState]", page: _Page | None) -> None:
+    from rigwatch.fleet import as_lines
+
+    if page is not None:
+        page.write(states)
     if arguments.json:
         print_json(states)
-    elif not arguments.page:
+    elif page is None:
         clear = "\x1b[2J\x1b[H" if arguments.follow and sys.stdout.isatty() else ""
         print(clear + "\n".join(as_lines(states)), flush=True)

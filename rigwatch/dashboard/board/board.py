@@ -38,6 +38,8 @@ from rigwatch.wire.messages import (
 APPLICATION = "rigwatch"
 _WORDS_EVERY_NS = 500_000_000
 _LAYOUT_EVERY_NS = 2_000_000_000
+_SET_BACK_NS = 10_000_000_000
+"""How far samples go back, at least, if their clock was set back; late ones are not that old."""
 
 
 class Dashboard:
@@ -48,6 +50,11 @@ class Dashboard:
         facts: known facts, updated in place.
         windows: time span of the plots.
         bare: hide the controls of the viewer, for pictures.
+
+    Attributes:
+        began_ns, now_ns: first and newest time drawn [ns].
+        set_back: the clock of the samples was set back. A viewer follows the newest time, and would
+            show nothing of what comes: it needs another recording.
     """
 
     def __init__(
@@ -60,6 +67,7 @@ class Dashboard:
     ) -> None:
         self.facts = facts
         self.began_ns = self.now_ns = 0
+        self.set_back = False
         self._stream, self._bare = stream, bare
         self._windows = windows or Windows()
         self._survey, self._batches = Survey(), Batches(facts.marks)
@@ -109,6 +117,7 @@ class Dashboard:
             self._say()
 
     def _samples(self, block: SampleBlock) -> None:
+        self.set_back |= self.facts.is_earlier(block, _SET_BACK_NS)
         plots = quantities.plots_of(block.channels, quantities.SAMPLE_PLOTS, "signals")
         self._plot(plots, block.t_ns, block.channels)
         self.facts.see_samples(block)

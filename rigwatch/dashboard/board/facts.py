@@ -71,6 +71,10 @@ class Facts:
         if len(block):
             self._newest_ns = int(block.t_ns[-1])
 
+    def is_earlier(self, block: SampleBlock, by_ns: int) -> bool:
+        """Whether a block is that much earlier than the samples before it [ns]."""
+        return len(block) > 0 and int(block.t_ns[0]) < self._newest_ns - by_ns
+
     def see_estimates(self, block: EstimateBlock) -> None:
         """Record the last estimates."""
         for column in block.columns if len(block) else ():

@@ -6,7 +6,7 @@ from rigwatch.structures.live.live_watch import LiveDamage
 from rigwatch.wire.bus import Bus, joined
 from rigwatch.wire.delivery import SampleReader
 from rigwatch.wire.errors import ModelError
-from rigwatch.wire.host import set_at_signal
+from rigwatch.wire.host import set_at_signal, unless_ended
 from rigwatch.wire.messages import HEALTH, Health, SampleBlock, topic_of
 from rigwatch.wire.rig_config import RigConfig
 
@@ -67,7 +67,7 @@ def watch_rig(config: RigConfig, watched: LiveDamage) -> None:
         BusError: the bus cannot be joined.
     """
     stop = set_at_signal()
-    watched.prepare()
+    unless_ended(stop, watched.prepare)
     with joined(config, PROCESS, stop) as bus:
         if bus is None:
             return

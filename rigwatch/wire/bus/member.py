@@ -134,6 +134,13 @@ class Member:
         found = self._names.names(self.key(places), timeout)
         return [(place[head:], name) for place, name in found]
 
+    def holders(self, place: str) -> set[str]:
+        """The names of all that hold a token at `place`.
+
+        Tokens of two processes at one key are one to those that watch them; each answers, though.
+        """
+        return self._names.holders(self.key(place))
+
     def watch_names(self, places: str, changed: Changed) -> Close:
         """Follow tokens with names, in another thread (`tokens/watching.py`)."""
         head = len(self.key(""))

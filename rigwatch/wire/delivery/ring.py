@@ -75,7 +75,8 @@ class RingStore:
         most = min(SAMPLES_PER_REPLY, self._size.samples_in(REPLY_BYTES))
         last = min(last, first + most - 1)
         seq = np.arange(first, last + 1)
-        runs = _runs(seq[self._seq[seq % self.capacity] == seq])
+        there = seq[self._seq[seq % self.capacity] == seq]
+        runs = _runs(there, self._t_ns[there % self.capacity])
         fitting = self._fitting(runs)
         if len(fitting) < len(runs):
             last = int(fitting[-1][-1])
@@ -112,11 +113,11 @@ def _layout(block: SampleBlock) -> tuple[tuple[str, str, bool], ...]:
     return tuple((c.name, c.unit, bool(len(c.quality))) for c in block.channels)
 
 
-def _runs(seq: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Stretches of consecutive numbers."""
+def _runs(seq: NDArray[np.int64], t_ns: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Stretches of consecutive numbers over which the clock was not set back."""
     if not len(seq):
         return []
-    return np.split(seq, np.flatnonzero(np.diff(seq) != 1) + 1)
+    return np.split(seq, np.flatnonzero((np.diff(seq) != 1) | (np.diff(t_ns) < 0)) + 1)
 
 
 class SampleRing:

@@ -44,7 +44,12 @@ SILENCE = 1.0
 """Time without a sample after which the ring is queried for more [s]."""
 CONTESTED = 1.0
 """Time for which samples sent under another process's boot count as a conflict [s]."""
-
+UNSURE = 15.0
+"""Time for which a source that came first may be silent while another sends, before a reader that
+has heard nothing of it passes it over: the token of one that is gone lasts as long as its link's
+lease [s]."""
+MOST_UNSURE = 16
+"""Boots of which that is followed at a time: a stranger may call any number his own."""
 MOST_REJECTED = 8
 """Senders whose invalid payloads are counted separately: identities cost a stranger nothing."""
 
@@ -69,7 +74,7 @@ class SampleReader:
         patient: see `SampleOrder`.
 
     Attributes:
-        heard: whether a sample block was ever received.
+        heard: whether a sample block of the source in control was ever received.
         rejected: payloads that were not sample blocks.
         rejected_by: the same by sender, for the first `MOST_REJECTED` of them.
         dropped: payloads left to the ring because the inbox was full; what a channel of the
@@ -96,6 +101,7 @@ class SampleReader:
         self._refused: tuple[int, str] | None = None
         self._impostor_at: float | None = None
         self._assumed: int | None = None
+        self._unsure = _Unsure()
         self._inbox: Inbox[_Incoming] = Inbox(capacity)
         self._questions = RingQuestions(bus, self._answered)
         self._heard_at = self._silence_told_at = time.monotonic()
@@ -139,7 +145,9 @@ class SampleReader:
         """Whether a second source sends samples besides the one that is read, or under its boot."""
         at = self._impostor_at
         impostor = at is not None and time.monotonic() - at < CONTESTED
-        return impostor or self._order.sources.contested
+        boot = self._order.sources.current
+        passed_over = boot is not None and self._owners.is_contested(boot)
+        return impostor or passed_over or self._order.sources.contested
 
     def is_source(self, boot: int, sender: str) -> bool:
         """Whether the identity `sender` may speak for a boot.
@@ -239,14 +247,24 @@ class SampleReader:
             self._refuse(block, sender)
             return
         self._notice_impostor(block.boot, sender)
-        self.heard = True
-        self._heard_at = self._silence_told_at = time.monotonic()
         self._handle(self._order.on_block(block))
+        if block.boot == self._order.sources.current:
+            self.heard = True
+            self._heard_at = self._silence_told_at = time.monotonic()
+            self._unsure.end()
+        elif self._order.position is None and self._unsure.lasts(None):
+            self._unsure.end()
+            self._handle(self._order.pass_over())
 
     def _refuse(self, block: SampleBlock, sender: str) -> None:
-        """Refuse samples of a boot that another process owns."""
+        """Refuse samples of a boot that another process owns, if that was ever heard."""
         self.counters.foreign += len(block)
         self._refused = block.boot, sender
+        if self._owners.is_doubtful(block.boot, sender) and self._unsure.lasts(block.boot):
+            self._unsure.end()
+            self._owners.pass_over(block.boot)
+            text = f"the process that first called itself the source of boot {block.boot} is silent"
+            self._report_event(Remark("error", "DUPLICATE SOURCE", f"{text}; another is read"))
 
     def _notice_impostor(self, boot: int, owner: str) -> None:
         """The owner still sends after foreign samples were refused: report the second sender."""
@@ -311,6 +329,27 @@ class SampleReader:
                 replies.append(RingReply.from_bytes(data))
         own = [reply for reply in replies if reply.boot == ask.boot]
         self._inbox.put((ask, max(own, key=lambda reply: reply.settled, default=None)))
+
+
+class _Unsure:
+    """How long a source that came first has been silent while another sends.
+
+    Of the boot that both call theirs, or of any boot: None.
+    """
+
+    def __init__(self) -> None:
+        self._since: dict[int | None, float] = {}
+
+    def lasts(self, boot: int | None) -> bool:
+        """Whether that has lasted long enough."""
+        now = time.monotonic()
+        if len(self._since) >= MOST_UNSURE and boot not in self._since:
+            del self._since[next(iter(self._since))]
+        return now - self._since.setdefault(boot, now) > UNSURE
+
+    def end(self) -> None:
+        """One is read."""
+        self._since.clear()
 
 
 def _sender(incoming: _Incoming) -> str | None:

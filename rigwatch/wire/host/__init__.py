@@ -2,13 +2,14 @@
 
 from rigwatch.wire.host.both_clocks import both_clocks
 from rigwatch.wire.host.disk_space import free_share
-from rigwatch.wire.host.ending import set_at_hangup, set_at_signal
+from rigwatch.wire.host.ending import set_at_hangup, set_at_signal, unless_ended
 from rigwatch.wire.host.few_pools import (
     keep_memory_tidy,
     settle_memory,
     tidy_memory,
     use_few_pools,
 )
+from rigwatch.wire.host.file_presence import may_be_file
 from rigwatch.wire.host.heartbeat import (
     DEVICE_SILENT,
     NO_ROUTER,
@@ -22,6 +23,7 @@ from rigwatch.wire.host.one_keeper import Hold, Kept
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
 from rigwatch.wire.host.printer import Printer
 from rigwatch.wire.host.processes import end_process, end_with_parent, last_line
+from rigwatch.wire.host.ready_files import ready_to_read, write_within
 from rigwatch.wire.host.realtime import (
     DAQ,
     MONITOR,
@@ -60,16 +62,20 @@ __all__ = [
     "is_free",
     "keep_memory_tidy",
     "last_line",
+    "may_be_file",
     "prepare_for_real_time",
     "raise_priority",
+    "ready_to_read",
     "replace_file",
     "run_side_by_side",
     "set_at_hangup",
     "set_at_signal",
     "settle_memory",
     "tidy_memory",
+    "unless_ended",
     "use_few_pools",
     "waits_for_samples",
     "waits_of",
     "write_through",
+    "write_within",
 ]

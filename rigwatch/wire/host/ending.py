@@ -10,13 +10,19 @@ import _thread
 import contextlib
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable
-from typing import Any
+from concurrent.futures import Future, wait
+from typing import Any, TypeVar
 
 PATIENCE = 8.0
 """Longest orderly end of a process whose supervisor is gone; as long as a supervisor waits [s]."""
+
+TURN = 0.05
+"""Time between two looks whether a process is to end [s]."""
+T = TypeVar("T")
 
 
 def set_at_signal() -> threading.Event:
@@ -41,6 +47,34 @@ def set_at_hangup() -> threading.Event:
     event = threading.Event()
     signal.signal(signal.SIGHUP, _in_a_thread(event.set))
     return event
+
+
+def unless_ended(stop: threading.Event, work: Callable[[], T]) -> T:
+    """What `work` returns or raises; once `stop` is set, the process ends with code 0 instead.
+
+    For what takes long, cannot be interrupted and leaves nothing open, as compiling at the start.
+    """
+    done: Future[T] = Future()
+
+    def run() -> None:
+        try:
+            done.set_result(work())
+        except BaseException as error:
+            done.set_exception(error)
+
+    threading.Thread(target=run, name="start", daemon=True).start()
+    while not wait([done], TURN).done:
+        if stop.is_set():
+            _leave()
+    return done.result()
+
+
+def _leave() -> None:
+    """End the process without its threads: one that compiles would crash as Python ends."""
+    for output in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            output.flush()
+    os._exit(0)
 
 
 def _in_a_thread(act: Callable[[], None]) -> Callable[..., Any]:

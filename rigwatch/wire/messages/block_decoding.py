@@ -6,6 +6,7 @@ A view and a copy for each column cost more than the numbers of a block of some 
 that wait together and follow one another become one block, with the objects of one.
 """
 
+import struct
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
@@ -28,6 +29,7 @@ from rigwatch.wire.messages.packed import (
 )
 
 T = TypeVar("T", bound=np.generic)
+_TIME = struct.Struct("<q")
 Numbers = tuple[IntArray, FloatArray, ByteArray]
 """Times, values and quality, each with the samples in the last axis."""
 
@@ -90,7 +92,14 @@ def _follows(one: _Part, other: _Part) -> bool:
         and other.boot == one.boot
         and other.device == one.device
         and (other.layout is one.layout or other.layout.names == one.layout.names)
+        and _time_of(other, 0) >= _time_of(one, one.layout.samples - 1)  # the clock may be set back
     )
+
+
+def _time_of(part: _Part, sample: int) -> int:
+    """Unix time of a sample, counted from 0 [ns]."""
+    (t_ns,) = _TIME.unpack_from(part.data, part.layout.times[-1] + _TIME.size * sample)
+    return int(t_ns)
 
 
 def _block(kind: type[K], run: Sequence[_Part]) -> K:

@@ -1,7 +1,7 @@
 """Cuts, joins and orders blocks of samples or estimates, without changing a value.
 
-A block holds consecutive samples `seq`, `seq + 1`, … of one boot of one device. Two blocks are
-joined only if the second continues the first and has the same columns.
+A block holds consecutive samples `seq`, `seq + 1`, … of one boot of one device, whose times do not
+go back. Two blocks are joined only if the second continues the first and has the same columns.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -23,14 +23,20 @@ def columns_of(block: Block) -> Sequence[Column]:
 
 
 def continues(first: Block, second: Block) -> bool:
-    """Whether `second` begins with the sample after `first`, with the same columns."""
+    """Whether `second` begins with the sample after `first`, not earlier, with the same columns."""
     return (
         second.seq == first.seq + len(first)
         and second.boot == first.boot
         and second.device == first.device
         and type(second) is type(first)
+        and not _goes_back(first, second)
         and _same_layout(columns_of(first), columns_of(second))
     )
+
+
+def _goes_back(first: Block, second: Block) -> bool:
+    """Whether the clock was set back between them."""
+    return bool(len(first) and len(second) and second.t_ns[0] < first.t_ns[-1])
 
 
 def _same_layout(first: Sequence[Column], second: Sequence[Column]) -> bool:

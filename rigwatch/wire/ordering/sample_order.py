@@ -131,6 +131,15 @@ class SampleOrder(Generic[S]):
             self._change_control((boot, 0))
         return self._outcomes()
 
+    def pass_over(self) -> list[Outcome[S]]:
+        """Join the oldest source that sends, if none was joined: those before it are silent."""
+        if (found := self.sources.pass_over()) is not None:
+            boot, seq = found
+            text = f"boot {boot} is read; a source that came before it sends nothing"
+            self._out.append(Remark("error", "DUPLICATE SOURCE", text))
+            self._join(boot, seq)
+        return self._outcomes()
+
     def on_silence(self) -> list[Outcome[S]]:
         """Handle silence: lost samples at the end are not revealed by a successor."""
         self._change_control(self.sources.fell_silent())

@@ -5,6 +5,9 @@ control is alive, samples of another are refused and the conflict is reported; w
 other takes over. A restarted device looks the same for some milliseconds if its first sample
 arrives before the end of the old token is known. In that case nothing of the new boot is skipped,
 because no sample of the old one arrived in between.
+
+A token proves nothing: without keys anybody can declare one with an early start. A reader that has
+joined no source yet therefore passes over those that send nothing, if another one does.
 """
 
 from dataclasses import dataclass
@@ -61,6 +64,7 @@ class Sources:
         self._silent = False
         self._latest_ns = -(2**62)
         self._rivals: dict[int, Rival] = {}
+        self._passed: set[int] = set()
 
     def is_alive(self, boot: int) -> bool:
         """Whether the boot's token exists."""
@@ -73,8 +77,8 @@ class Sources:
 
     @property
     def contested(self) -> bool:
-        """Whether a second source sends samples besides the one in control."""
-        return any(
+        """Whether a second source sends samples besides the one in control, or was passed over."""
+        return not self._passed.isdisjoint(self._alive) or any(
             rival.told and (boot in self._alive or boot not in self._since)
             for boot, rival in self._rivals.items()
         )
@@ -108,6 +112,9 @@ class Sources:
             # The same boot returned with a newer token before the end of the old one was reported.
             return None
         self._alive.pop(boot, None)
+        if self.current is None:
+            self._rivals.pop(boot, None)
+            return None
         rival = self._rivals.get(boot)
         if rival is None or self._released():
             return None
@@ -126,10 +133,21 @@ class Sources:
         successor: it takes over once it sends again.
         """
         sending = [b for b, one in self._rivals.items() if b in self._alive or not one.from_seq]
-        if not sending or not self._released():
+        if not sending or self.current is None or not self._released():
             return None
         boot = min(sending, key=lambda b: self._alive.get(b, 2**63))
         return boot, self._rivals[boot].from_seq
+
+    def pass_over(self) -> tuple[int, int] | None:
+        """(boot, first sample) of the oldest source that sends while none has control.
+
+        The older ones, which send nothing, are passed over. None if no such source sends.
+        """
+        if self.current is not None or not self._rivals:
+            return None
+        boot = min(self._rivals, key=lambda b: self._alive[b])
+        self._passed = {b for b, since in self._alive.items() if since < self._alive[boot]}
+        return boot, self._rivals[boot].first
 
     def take_control(self, boot: int) -> None:
         """Give control to `boot`."""
@@ -148,9 +166,13 @@ class Sources:
         """Decide whether a block changes control."""
         if block.boot == self.current:
             return self._current_spoke(block)
-        if self.current is None:
-            return Verdict(control_from=block.seq if self._is_oldest(block.boot) else None)
-        return self._other_spoke(block)
+        if self.current is not None:
+            return self._other_spoke(block)
+        if self._is_oldest(block.boot):
+            return Verdict(control_from=block.seq)
+        if self.is_alive(block.boot):
+            self._rival(block)
+        return NO_CHANGE
 
     def goes_on(self, block: SampleBlock | Numbered) -> bool:
         """Whether the source in control speaks while no other does, which changes nothing."""
@@ -161,7 +183,7 @@ class Sources:
 
     def _hear(self, block: SampleBlock | Numbered) -> None:
         self._silent = False
-        self._latest_ns = max(self._latest_ns, int(block.t_ns[-1]))
+        self._latest_ns = int(block.t_ns[-1])  # the clock may have been set back
 
     def _current_spoke(self, block: SampleBlock | Numbered) -> Verdict:
         self._hear(block)
@@ -173,18 +195,24 @@ class Sources:
         return Verdict(remark=self._conflict(untold[0])) if untold else Verdict()
 
     def _other_spoke(self, block: SampleBlock | Numbered) -> Verdict:
-        boot, end = block.boot, block.seq + len(block) - 1
+        boot = block.boot
         if not self.is_alive(boot) and self._is_past(block):
             return Verdict()
+        rival = self._rival(block)
+        if self._released():
+            return Verdict(control_from=rival.from_seq)
+        certain = self.is_alive(boot) and self.current in self._alive
+        return Verdict(remark=self._conflict(boot)) if certain and not rival.told else Verdict()
+
+    def _rival(self, block: SampleBlock | Numbered) -> Rival:
+        """The source of a block, which has no control, as it is after it."""
+        boot, end = block.boot, block.seq + len(block) - 1
         rival = self._rivals.get(boot)
         if rival is None:
             self._make_room(boot)
             rival = self._rivals[boot] = Rival(block.seq, end, 0)
         rival.last = max(rival.last, end)
-        if self._released():
-            return Verdict(control_from=rival.from_seq)
-        certain = self.is_alive(boot) and self.current in self._alive
-        return Verdict(remark=self._conflict(boot)) if certain and not rival.told else Verdict()
+        return rival
 
     def _make_room(self, boot: int) -> None:
         """Drop the oldest rival without a token if another one is too many."""

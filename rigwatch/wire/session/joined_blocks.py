@@ -115,17 +115,19 @@ def _index(kind: type[Any], payloads: Sequence[bytes]) -> _Index:
     tables = list(_tables(kind, payloads))
     m = len(payloads)
     at = _Index(tables, np.full(m, -1), np.full(m, -1), np.zeros(m, np.bool_))
-    first, after, sender = np.zeros((3, m), np.int64)
+    first, after, sender, begin_ns, end_ns = np.zeros((5, m), np.int64)
     senders: dict[Any, int] = {}
     for number, table in enumerate(tables):
         seq, alike = _compared(table)
         places = table.places[alike]
         at.table[places], at.row[places] = number, np.flatnonzero(alike)
         first[places], after[places] = seq[alike], seq[alike] + table.layout.samples
+        begin_ns[places], end_ns[places] = (ns[alike] for ns in _times(table))
         sender[places] = senders.setdefault(table.sender, len(senders))
     known = at.table >= 0
     at.follows[1:] = known[1:] & known[:-1]
     at.follows[1:] &= (first[1:] == after[:-1]) & (sender[1:] == sender[:-1])
+    at.follows[1:] &= begin_ns[1:] >= end_ns[:-1]  # else the clock was set back
     return at
 
 
@@ -153,6 +155,16 @@ def _compared(table: _Table) -> tuple[IntArray, BoolArray]:
     seq, alike = table.layout.first_numbers(table.raw)
     shared = table.raw[:, table.layout.shared]
     return seq, alike & (shared == shared[0]).all(axis=1)
+
+
+def _times(table: _Table) -> tuple[IntArray, IntArray]:
+    """Unix time of the first and of the last sample of each row [ns]; none follows without any."""
+    begin, samples = table.layout.times[-1], table.layout.samples
+    if not samples:
+        none = np.zeros(len(table.raw), np.int64)
+        return none + np.iinfo(np.int64).min, none + np.iinfo(np.int64).max
+    rows = np.ascontiguousarray(table.raw[:, begin : begin + _WORD * samples]).view("<i8")
+    return rows[:, 0], rows[:, -1]
 
 
 def _numbers(index: _Index, first: int, last: int) -> Numbers:

@@ -191,7 +191,8 @@ class _Device:
     def _measure_steps(self, block: SampleBlock) -> None:
         t_ns = block.t_ns
         if self._last is not None and self._last[:2] == (block.boot, block.seq):
-            t_ns = np.concatenate([[self._last[2]], t_ns])
+            set_back = t_ns[0] < self._last[2]
+            t_ns = t_ns if set_back else np.concatenate([[self._last[2]], t_ns])
         if len(t_ns) > 1:
             longest = int(np.diff(t_ns).max()) / 1e9
             self._figures.longest_step_s = max(self._figures.longest_step_s, longest)

@@ -16,7 +16,7 @@ from typing import Any
 
 import msgspec
 
-from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.errors import ConfigError, reason_of
 from rigwatch.wire.typed_files.explanation import explained, line_of
 from rigwatch.wire.typed_files.loading import S, read_text, tables
 from rigwatch.wire.typed_files.writing import as_toml
@@ -66,10 +66,15 @@ def read_layers(path: Path | str) -> list[Layer]:
         named_in = layers[-1]
         if not isinstance(base, str):
             raise _of_base(named_in, repr(base), "the path of a file")
-        file = _plain(named_in.file.parent / base)
-        if not file.is_file():
+        try:
+            file = _plain(named_in.file.parent / base)
+            there = file.is_file()
+            back = there and any(file.samefile(layer.file) for layer in layers)
+        except OSError as error:  # a name that is too long, a share that does not answer
+            raise _of_base(named_in, repr(base), f"a file; {reason_of(error)}") from None
+        if not there:
             raise _of_base(named_in, repr(base), f"a file; there is no {file}")
-        if any(file.samefile(layer.file) for layer in layers) or len(layers) == MOST_LAYERS:
+        if back or len(layers) == MOST_LAYERS:
             raise _of_base(named_in, repr(base), "a file that does not lead back to this one")
         layers.append(_layer(file))
     return layers

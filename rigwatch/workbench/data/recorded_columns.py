@@ -24,6 +24,8 @@ MEAN_AT = 0.25
 """Highest frequency over the rate at which interpolated samples show their noise. Each mixes two
 neighbours, so that the density of white noise becomes r0 + 2 r1 cos(2 pi f): its mean, r0, stands
 at a quarter of the rate, more below, less above."""
+SET_NS, MOST_DRIFT = 5e8, 1e-3
+"""What a clock is set by at least [ns], and how fast or slow it may run over a gap."""
 LARGEST = 1e70
 """Largest value that counts as measured [SI]: the fourth power is summed over a recording."""
 
@@ -41,7 +43,7 @@ def read_columns(folder: Path, span: Span) -> Columns:
         raise ModelError(f"{span.session}: found {len(boots)} runs of a device, expected one")
     first, last = blocks[0], blocks[-1]
     count = last.seq + len(last) - first.seq
-    dt = float(last.t_ns[-1] - first.t_ns[0]) * 1e-9 / max(count - 1, 1)
+    dt = _elapsed_ns(blocks) * 1e-9 / max(count - 1, 1)
     if not dt > 0:
         raise ModelError(
             f"{span.session}: found {count} samples in {dt * (count - 1):g} s, expected at least"
@@ -66,6 +68,19 @@ def read_columns(folder: Path, span: Span) -> Columns:
     if moved:
         return Columns(dt, measured, units, (INTERPOLATED,), MEAN_AT)
     return Columns(dt, measured, units)
+
+
+def _elapsed_ns(blocks: Sequence[SampleBlock]) -> float:
+    """Time from the first sample to the last [ns], whatever the clock was set by in between."""
+    t_ns = np.concatenate([block.t_ns for block in blocks])
+    numbers = np.diff(np.concatenate([block.seq + np.arange(len(block)) for block in blocks]))
+    steps = np.diff(t_ns)
+    if not len(steps):
+        return 0.0
+    usual = float(np.median(steps / numbers))
+    odd = steps - usual * numbers
+    was_set = np.abs(odd) > SET_NS + usual * (2.0 + MOST_DRIFT * numbers)
+    return float(t_ns[-1] - t_ns[0]) - float(np.sum(odd[was_set]))
 
 
 def _share_interpolated(blocks: Sequence[SampleBlock]) -> float:

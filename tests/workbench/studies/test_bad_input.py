@@ -1,6 +1,7 @@
 """Recordings that do not suit a model: one plain line, and nothing is lost."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from rigwatch.physics.engine.fit.windowed_fit import fit
 from rigwatch.wire.errors import ConfigError, ModelError
 from rigwatch.wire.exchange.importing import import_file
 from rigwatch.wire.exchange.mapping import ImportMapping, parse_map_option
+from rigwatch.wire.session import SessionWriter, open_session, run_info, summarise
 from rigwatch.wire.typed_files.loading import parse
 from rigwatch.workbench.compare.compare import compare
 from rigwatch.workbench.data.recorded_columns import read_columns
@@ -22,6 +24,7 @@ from rigwatch.workbench.fit.intervals import identifiability
 from rigwatch.workbench.study.creation import create
 from rigwatch.workbench.study.study import Study, open_study
 from rigwatch.workbench.study.study_file import Span
+from tests.bus.samples import block
 from tests.workbench.machine import studied
 
 MODEL = """
@@ -222,3 +225,25 @@ def test_rows_that_are_lost_are_missing_and_jittered_ones_are_not(
     found = read_columns(tmp_path, Span(session="log.mcap"))
     assert np.flatnonzero(np.isnan(found.values["y"])).tolist() == missing
     assert bool(found.altered) == (not missing)
+
+
+@pytest.mark.parametrize("set_by", [-3600.0, 3600.0, 0.7, 0.0])
+@pytest.mark.parametrize("lost", [0, 100])
+def test_a_clock_that_was_set_in_a_recording_changes_no_rate(
+    tmp_path: Path, set_by: float, lost: int
+) -> None:
+    numbers = [*range(300), *range(300 + lost, 900)]
+    with SessionWriter(tmp_path / "log.mcap", run_info("bench", 256.0)) as writer:
+        for first in range(0, len(numbers), 100):
+            seq = numbers[first]
+            was_set = set_by * 1e9 if seq >= 500 else 0.0
+            part = block(seq, 100, start_ns=10**18 + round(was_set))
+            writer.write(replace(part, channels=part.channels[:1]))
+    session = open_session(tmp_path / "log.mcap")
+    blocks = list(session.samples())
+    assert all((np.diff(one.t_ns) > 0).all() for one in blocks)
+    assert len(blocks) == 1 + (lost > 0) + (set_by < 0)
+    assert [n for one in blocks for n in range(one.seq, one.seq + len(one))] == numbers
+    assert read_columns(tmp_path, Span(session="log.mcap")).dt == pytest.approx(1 / 256, rel=1e-6)
+    (device,) = summarise(session).devices
+    assert set_by > 0 or device.rate_hz == pytest.approx(256.0, rel=1e-6)

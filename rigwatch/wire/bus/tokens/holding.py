@@ -2,7 +2,7 @@
 
 import secrets
 
-from rigwatch.wire.bus.tokens.names import ASK_TIMEOUT, said
+from rigwatch.wire.bus.tokens.names import said
 from rigwatch.wire.bus.transport import Close, Transport
 
 GROUPS, TURNS = 8, 4
@@ -11,6 +11,9 @@ SLOTS = GROUPS * TURNS
 so that a token that appears is never mistaken for the one that has just vanished."""
 ATTEMPTS = 5
 """Groups tried while another process takes the same one at the same moment."""
+PATIENCE = 2.0
+"""Longest wait for those that hold tokens there [s]: on a busy machine a group that is taken would
+look free, and two tokens at one key are one to those that watch them."""
 
 
 class NamedToken:
@@ -45,12 +48,12 @@ class NamedToken:
             self.close()
             self._group = self._free_group()
             self._answer(name)
-            found = self._transport.ask(self._key(), b"", ASK_TIMEOUT)
+            found = self._transport.ask(self._key(), b"", PATIENCE)
             if all(answer == said(self._key(), name) for answer in found):
                 return
 
     def _free_group(self) -> int:
-        tokens = self._transport.tokens(f"{self._place}/*", ASK_TIMEOUT)
+        tokens = self._transport.tokens(f"{self._place}/*", PATIENCE)
         slots = [key.rpartition("/")[2] for key in tokens]
         taken = {int(slot) // TURNS for slot in slots if slot.isdecimal() and len(slot) < 4}
         free = [group for group in range(GROUPS) if group not in taken] or [*range(GROUPS)]

@@ -71,6 +71,12 @@ class NamedTokens:
         found = dict(filter(None, map(understood, answers)))
         return [(_place(key), found.get(key)) for key in keys]
 
+    def holders(self, place: str) -> set[str]:
+        """The names of all that hold a token at a place, also of several at one key."""
+        answers = self._transport.ask(f"{place}/*", b"", ASK_TIMEOUT)
+        found = filter(None, map(understood, answers))
+        return {name for key, name in found if _place(key) == place}
+
     def watch(self, places: str, changed: Changed) -> Close:
         """Follow the tokens of all places that match, first those that are there.
 
