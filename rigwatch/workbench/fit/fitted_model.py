@@ -105,8 +105,8 @@ def fit_base(
     own = {name: value for name, value in start.items() if name in study.model.parameters}
     found = fit_model(study, data, (), own, scale, multi_start=True)
     for count in range(1, len(placements) + 1):
-        waiting = tuple(placement.prefix for placement in placements[count:])
-        begin = {name: value for name, value in start.items() if not name.startswith(waiting)}
+        waiting = {p.prefix + name for p in placements[count:] for name in p.effect.parameters}
+        begin = {name: value for name, value in start.items() if name not in waiting}
         begin |= found.train.values()
         found = fit_with_retry(study, data, placements[:count], begin, scale, multi_start=True)
     return found

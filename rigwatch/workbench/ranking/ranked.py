@@ -135,12 +135,7 @@ def _within(p: EffectParameter, strength: float) -> float:
 def accepted_from(row: Ranked) -> Accepted:
     """The row as an entry of the study's file, with its fitted parameters."""
     assert row.fitted is not None
-    prefix = row.placement.prefix
-    values = {
-        name[len(prefix) :]: value
-        for name, value in row.fitted.train.values().items()
-        if name.startswith(prefix)
-    }
+    values = row.placement.own(row.fitted.train.values())
     placed = row.fitted.placements[-1]
     return Accepted(
         effect=row.effect, port=row.port, parameters=values, ahead=placed.ahead,
