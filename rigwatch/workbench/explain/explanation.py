@@ -127,7 +127,7 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         list(verdict.rivals),
         list(verdict.second),
         _experiment(bench, rows, verdict),
-        None if unlike or (similar[0] and most is None) else probability,
+        None if unlike or most is None else probability,
         similar,
         list(verdict.beside),
         compared.unit,
