@@ -8,7 +8,12 @@ import pytest
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare.preparation import Bench, bench_of, open_bench
 from rigwatch.workbench.data.signals import Data
-from rigwatch.workbench.experiment.next_experiment import excitation, propose
+from rigwatch.workbench.experiment.next_experiment import (
+    _first_states,
+    _separation,
+    excitation,
+    propose,
+)
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.explain.explanation import explanation
 from rigwatch.workbench.explain.verdict import Verdict
@@ -107,3 +112,22 @@ def test_an_experiment_on_a_slow_machine_lasts_as_long_as_its_recordings(tmp_pat
     assert samples > 300
     assert proposed.duration == pytest.approx(samples * EVERY, rel=0.01)
     assert f"{proposed.duration:.3g} s: offset@probe would differ" in proposed.text
+
+
+def test_rivals_are_compared_in_the_shape_that_was_fitted(tmp_path: Path) -> None:
+    bench = open_bench(damper(tmp_path, lambda x, v: 3 * np.sign(v) * np.exp(-np.abs(v) / 0.01)))
+    rows = [
+        rank_only(bench.study, bench.data, bench.base, found)
+        for name in ("stribeck", "linear_stiffness")
+        if (found := shapes_of(bench.study, bench.data.train, name, "load"))
+    ]
+    for row in rows:
+        refit(bench.study, bench.data, bench.base, row)
+    assert rows[0].fitted is not None
+    # The speed over which it falls, as fitted, is none of those that were tried.
+    values = rows[0].placement.own(rows[0].fitted.train.values())
+    assert values["vst"] != rows[0].start["vst"]
+    inputs, first = bench.data.train.inputs, _first_states(bench)
+    as_fitted = _separation(bench, rows, inputs, first)
+    rows[0].start = values
+    assert as_fitted == _separation(bench, rows, inputs, first)

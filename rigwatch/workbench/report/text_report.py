@@ -16,8 +16,8 @@ VERDICTS = {
     "model_inadequate": "the model is inadequate for this recording: no effect is named",
 }
 BEYOND = (
-    "the recordings ask for the bound's value or one beyond it, and the interval does not hold there;"
-    " if a bound is the machine's own, the model may lack something"
+    "the recordings ask for the bound's value or one beyond it, and the interval does not hold"
+    " there; if the bound is the machine's own, the model may lack something"
 )
 """What it means that a parameter is on a bound."""
 MOST_ROWS = 12

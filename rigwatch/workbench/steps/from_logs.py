@@ -60,7 +60,6 @@ def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
         check_different(folder, logs)
         known = {log: values | dict(logs.known.get(log, {})) for log, values in stated.items()}
         logs = replace(logs, known={**logs.known, **known})
-        check_names(logs, model)
         text, choices = _file(files, logs, model, reading)
         for name in (FILE, LEDGER):
             files.to_write(name)
