@@ -52,7 +52,9 @@ def _divided(
     """The rows of one block in parts that tell equally much of what only this block shows."""
     places, sample = np.unique(order, return_inverse=True)
     told = np.bincount(sample, np.sum(slopes**2, axis=1))
-    shares = np.stack([np.bincount(sample, each * error) for each in slopes.T], axis=1)[None]
+    shares = np.empty((1, len(places), slopes.shape[1]))
+    for index, each in enumerate(slopes.T):
+        shares[0, :, index] = np.bincount(sample, each * error)
     memory = max(correlation_time(each) for each in autocorrelation(shares, len(places)).T)
     count = int(np.clip(np.count_nonzero(told) / (MEMORIES * memory), 1, MOST))
     before = np.cumsum(told) - told

@@ -70,8 +70,8 @@ def denies_gain(healthy: Recording, test: Recording, rate: int, gain: float) -> 
     if before is None or after is None or not min(before.value, after.value, gain) > 0.0:
         return ""
     changed = float(np.log(after.value / before.value))
-    relative = (each.deviation / each.value for each in (before, after))
-    unsure = ROUGH + SURE * float(np.hypot(*relative))
+    relative = [each.deviation / each.value for each in (before, after)]
+    unsure = ROUGH + SURE * float(np.linalg.norm(relative))
     expected = float(np.log(gain))
     if abs(expected - changed) <= max(unsure, (1.0 - SEEN) * abs(expected)):
         return ""
