@@ -98,11 +98,11 @@ def covariance(fitted: Fit, repeat: int = 0) -> tuple[FloatArray, FloatArray]:
     parts = with_lone_blocks_divided(whole, error, block_numbers(fitted, repeat), order)
     own = np.array([whole[rows].T @ whole[rows] for rows in parts])
     normal = whole.T @ whole
-    rest = np.array([np.linalg.pinv(normal - each, rcond=TOLD) for each in own])
+    rest = np.linalg.pinv(normal - own, rcond=TOLD)
     slopes = np.array([whole[rows].T @ error[rows] for rows in parts])
     moved = np.clip(np.einsum("bij,bj->bi", rest, slopes) / size, -FARTHEST, FARTHEST)
     spread = moved.T @ moved * ((len(parts) - 1) / len(parts))
-    lone = np.any([lost(normal - each) & ~lost(normal) for each in own], axis=0)
+    lone = np.any(lost(normal - own) & ~lost(normal), axis=0)
     spread[lone, lone] = FARTHEST**2
     return np.asarray(spread), _degrees_of_freedom(normal, own, rest)
 

@@ -20,9 +20,9 @@ MEMORIES, MOST = 2.0, 8
 
 
 def lost(information: FloatArray) -> BoolArray:
-    """Which parameters information of shape (m, m) does not determine, shape (m,)."""
+    """Which parameters information of shape (…, m, m) does not determine, shape (…, m)."""
     kept = information @ np.linalg.pinv(information, rcond=TOLD)
-    return np.asarray(1.0 - np.diag(kept) > LOST)
+    return np.asarray(1.0 - np.diagonal(kept, axis1=-2, axis2=-1) > LOST)
 
 
 def with_lone_blocks_divided(
@@ -38,11 +38,13 @@ def with_lone_blocks_divided(
     """
     blocks = [np.flatnonzero(number == block) for block in range(int(number.max()) + 1)]
     whole = slopes.T @ slopes
-    open_anyway, found = lost(whole), list[IntArray]()
-    for rows in blocks:
-        own = slopes[rows]
-        alone = lost(whole - own.T @ own) & ~open_anyway
-        found += _divided(own[:, alone], error[rows], rows, order[rows]) if alone.any() else [rows]
+    own = np.array([slopes[rows].T @ slopes[rows] for rows in blocks])
+    found = list[IntArray]()
+    for rows, alone in zip(blocks, lost(whole - own) & ~lost(whole), strict=True):
+        if alone.any():
+            found += _divided(slopes[rows][:, alone], error[rows], rows, order[rows])
+        else:
+            found.append(rows)
     return found
 
 
