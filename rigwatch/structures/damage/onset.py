@@ -22,6 +22,9 @@ ROOM, BEFORE = 20, 3
 FURTHER = 2
 """Samples considered before those, over their number, as long as the likeliest is among them: where
 a damage shows little, the residual falls back to noise after it, and the onset is far behind."""
+MOST = 96
+"""Instants tried in one of these steps back: a structure that never was the model's is likelier the
+earlier it is damaged, up to the beginning of a long record."""
 EXCLUDED = float(chi2.isf(0.05, 1))
 """Squared error over the noise above the least from which an instant is excluded."""
 AFTER = 100
@@ -65,7 +68,7 @@ def instant(
     known = high
     while low > watch.first and dating.best < known:
         known, low = low, max(watch.first, low - FURTHER * (high - low))
-        dating.compare(low, known, step)
+        dating.compare(low, known, max(step, (known - low) // MOST))
     while dating.is_coarse:
         before, after = dating.beside
         dating.compare(before, after, max((after - before) // FINE, 1))

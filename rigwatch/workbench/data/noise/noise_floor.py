@@ -1,10 +1,10 @@
 """The noise floor: the smallest error that can be reached, and how it is estimated.
 
 Repeated periods of the excitation are best: their differences are noise, and where a converter's
-step hides them, so is what its rounding makes. Next best is a healthy
-recording, which also includes model error, and then the noise that the study states. Otherwise the
-quietest band of the residual, assumed to be white noise, gives a lower limit, or what does not
-repeat with an excitation of any period where that is less: missing physics may fill all bands.
+step hides them, so is what its rounding makes. Next best is a healthy recording, which also
+includes model error, and then the noise that the study states. Otherwise the quietest band of the
+residual, assumed to be white noise, gives a lower limit, or what does not repeat with an excitation
+of any period where that is less: missing physics may fill all bands.
 """
 
 import math
