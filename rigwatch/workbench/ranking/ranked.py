@@ -8,6 +8,7 @@ import numpy as np
 from rigwatch.physics.engine.equations import EffectParameter, Placement
 from rigwatch.physics.engine.score import Candidate, Standing
 from rigwatch.workbench.fit import Fitted
+from rigwatch.workbench.ranking.paired_test import difference
 from rigwatch.workbench.study import Accepted
 
 SAME = 0.9995
@@ -130,6 +131,29 @@ def start_of(candidate: Candidate, strength: float) -> dict[str, float]:
 def _within(p: EffectParameter, strength: float) -> float:
     """Initial value of the strength parameter, within its bounds."""
     return 1.0 if p.role == "switch" else float(np.clip(p.neutral + strength, p.low, p.high))
+
+
+def error_ratio(one: Ranked, other: Ranked) -> float:
+    """Held-out error of another fitted row over that of one, on the samples that count for both.
+
+    Samples from which the states of an effect are found do not count for it.
+    """
+    assert one.fitted is not None
+    assert other.fitted is not None
+    own, others = one.fitted.held_out, other.fitted.held_out
+    counted = (np.isfinite(fit.residuals).ravel() for fit in (own, others))
+    if np.array_equal(*counted):
+        return other.held_out_error / one.held_out_error
+    return 1.0 - difference(own, others).relative
+
+
+def lowest(rows: Sequence[Ranked]) -> Ranked:
+    """The fitted row with the smallest held-out error, each two compared where both count."""
+    found = min(rows, key=lambda row: row.held_out_error)
+    for row in rows:
+        if row is not found and error_ratio(found, row) < 1.0:
+            found = row
+    return found
 
 
 def accepted_from(row: Ranked) -> Accepted:
