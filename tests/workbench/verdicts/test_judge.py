@@ -895,19 +895,19 @@ def test_an_effect_far_better_within_the_models_own_error_has_no_rival() -> None
 # ---- where samples tell the states of an effect, and do not count for it -----------------------
 
 
-def beginning_badly(found: Ranked, counts: bool) -> Ranked:
-    """The row, of which the first four windows hold what neither effect explains."""
+def beginning_badly(found: Ranked, error: float = np.nan) -> Ranked:
+    """The row with another error in the first four windows, which may not count for it."""
     assert found.fitted is not None
     residuals = found.fitted.held_out.residuals.copy()
-    residuals[:4] = 10.0 if counts else np.nan
+    residuals[:4] = error
     fit = replace(found.fitted.held_out, residuals=residuals)
     found.fitted = replace(found.fitted, train=fit, held_out=fit)
     return found
 
 
 def test_an_effect_is_not_named_for_the_samples_that_do_not_count_for_it() -> None:
-    better = beginning_badly(row("coulomb@load", 1.0), counts=True)
-    worse = beginning_badly(row("dahl@other", 1.3), counts=False)
+    better = beginning_badly(row("coulomb@load", 1.0), 10.0)
+    worse = beginning_badly(row("dahl@other", 1.3))
     assert worse.held_out_error < better.held_out_error
     for rows in ([better, worse], [worse, better]):
         found = judge(base(), rows, PERIODS)
@@ -916,9 +916,10 @@ def test_an_effect_is_not_named_for_the_samples_that_do_not_count_for_it() -> No
 
 
 def test_nor_is_it_a_rival_for_them() -> None:
-    best_one = beginning_badly(best("coulomb@load", 2.0), counts=True)
-    other = beginning_badly(row("dahl@load", 2.3), counts=False)
-    assert not explaining_all(base(), best_one, (), [best_one, other], PERIODS)
-    less = beginning_badly(row("stribeck@load", 1.8), counts=False)
-    assert leaves_less_of_all(less.fitted, best_one.fitted)
-    assert not leaves_less_of_all(other.fitted, best_one.fitted)
+    named = beginning_badly(best(error=2.0), 2.5)
+    other, less = beginning_badly(row("dahl@other", 2.1)), beginning_badly(row("lag@other", 1.9))
+    assert not explaining_all(base(), named, (), [named, other], PERIODS)
+    assert named.fitted is not None
+    for each, leaves_less in ((other, False), (less, True)):
+        assert each.fitted is not None
+        assert leaves_less_of_all(each.fitted, named.fitted) is leaves_less
