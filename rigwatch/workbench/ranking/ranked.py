@@ -141,8 +141,8 @@ def error_ratio(one: Ranked, other: Ranked) -> float:
     assert one.fitted is not None
     assert other.fitted is not None
     own, others = one.fitted.held_out, other.fitted.held_out
-    counted = (np.isfinite(fit.residuals).ravel() for fit in (own, others))
-    if np.array_equal(*counted):
+    one_counts, other_counts = (np.isfinite(fit.residuals).ravel() for fit in (own, others))
+    if np.array_equal(one_counts, other_counts):
         return other.held_out_error / one.held_out_error
     return 1.0 - difference(own, others).relative
 
