@@ -230,6 +230,15 @@ def test_parts_are_smoothed_apart_and_settle_apart() -> None:
     assert np.isfinite(motion.outputs[550:990]).all()
 
 
+def test_nothing_counts_of_a_part_that_is_shorter_than_the_smoothing() -> None:
+    whole = _measured(seconds=1.1)
+    both = Recording(whole.dt, whole.inputs[:520], whole.outputs[:520])
+
+    motion = motion_recording(_actuated_mass(), both, parts=(500, 20), widths={"position": 41})
+
+    assert np.flatnonzero(np.isfinite(motion.outputs[:, 0])).tolist() == list(range(20, 480))
+
+
 @pytest.mark.parametrize("order", [0, 1, 2])
 def test_smoothing_is_as_wide_as_noise_asks(order: int) -> None:
     t = np.arange(4000) / 256

@@ -63,7 +63,7 @@ def test_a_broken_row_is_no_header(tmp_path):
         found.numbers("t")
 
 
-@pytest.mark.parametrize("encoding", ["cp1252", "utf-16", "utf-8-sig"])
+@pytest.mark.parametrize("encoding", ["cp1252", "utf-16", "utf-16-le", "utf-16-be", "utf-8-sig"])
 def test_a_degree_sign_is_read_in_any_usual_encoding(tmp_path, encoding):
     assert table(tmp_path, "t,T (°C)\n0,1\n1,2\n", encoding).names == ("t", "T (°C)")
 

@@ -6,11 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigwatch.structures.damage.examination import Settings, examine
 from rigwatch.structures.identification.gauss_newton import solve
 from rigwatch.structures.identification.identify import METHODS, identify
 from rigwatch.structures.identification.problem import problem_of
+from rigwatch.structures.model.checks import load_structure
 from rigwatch.structures.records.record import Record, read_record
 from rigwatch.wire.errors import ImportDataError, ModelError
+from sim_plant.structure import simulate
 from tests.structures.antenna import NAMES, antenna
 
 TIME = np.arange(100) * 0.01
@@ -64,3 +67,28 @@ def test_an_unknown_that_is_lost_on_the_way_is_refused_at_the_end() -> None:
     problem = problem_of(antenna(), Record(0.01, {"x6": np.zeros(100)}), NAMES)
     with pytest.raises(ModelError, match="does not determine k1_6_cubic"):
         solve(problem)
+
+
+SOFTENING = """
+name = "frame"
+summary = "A mass on a spring that the file says softens much."
+[nodes]
+1.mass = 1.0
+[springs]
+ground = { between = ["1"], stiffness = 400.0 }
+[dampers]
+air = { between = ["1"], damping = 0.5 }
+[loads.wind]
+node = "1"
+sines = [{ amplitude = 40.0, omega = 9.0 }]
+"""
+
+
+def test_a_model_that_diverges_is_no_undamaged_structure(tmp_path: Path) -> None:
+    path = tmp_path / "frame.toml"
+    path.write_text(SOFTENING, encoding="utf-8")
+    made = simulate(path, 0.01, 6.0, damages=[])
+    record = Record(0.01, {"x1": made.columns["x1"]})
+    path.write_text(SOFTENING.replace("400.0", "400.0, cubic = -2e4"), encoding="utf-8")
+    with pytest.raises(ModelError, match=r"frame: the model diverges .* look at its cubic"):
+        examine(load_structure(path), record, Settings(known=True, undamaged=0.3))

@@ -61,7 +61,7 @@ class Judge:
 
     Attributes:
         sigma: standard deviation of each signal's residual, shape (m,).
-        calibration: number of undamaged samples behind `sigma`.
+        calibration: number of undamaged samples behind `sigma`, less what was fitted to them.
         rate: probability of a false alarm over a whole record.
         limit: fixed limit instead [the signals' units]; None for the cumulative sum.
     """
@@ -136,8 +136,15 @@ def rounded(samples: int) -> int:
     return int(100 * np.ceil(samples / 100))
 
 
-def noise(residual: FloatArray, observed: FloatArray) -> FloatArray:
-    """Standard deviation of undamaged residuals, at least the integration error, shape (m,)."""
+def noise(residual: FloatArray, observed: FloatArray, unknowns: int = 0) -> FloatArray:
+    """Standard deviation of undamaged residuals, at least the integration error, shape (m,).
+
+    Args:
+        residual: shape (samples, m); NaN where missing.
+        observed: the signals, of the same shape.
+        unknowns: number of figures identified from these samples, which took part of the noise.
+    """
+    count = int(np.isfinite(residual).sum())
     size = np.sqrt(np.nanmean(observed**2, axis=0))
-    found = np.sqrt(np.nanmean(residual**2, axis=0))
+    found = np.sqrt(np.nanmean(residual**2, axis=0) * count / max(count - unknowns, 1))
     return np.asarray(np.maximum(np.nan_to_num(found), FLOOR * np.nan_to_num(size)) + 1e-300)

@@ -125,7 +125,7 @@ def examine(
     base = reference(
         structure, record, undamaged, known=chosen.known, moving=chosen.moving, model=model
     )
-    judge = Judge(base.sigma, base.samples, chosen.rate, chosen.limit)
+    judge = Judge(base.sigma, base.freedom, chosen.rate, chosen.limit)
     work = _Search(base, judge, chosen, progress)
     work.run()
     return Examination(base, chosen, tuple(work.watches), tuple(work.damages))
@@ -180,7 +180,7 @@ class _Search:
 
     def _watched(self, estimate: _Estimate) -> Watch:
         model = self.base.model
-        return self.judge.watch(
+        watch = self.judge.watch(
             model,
             estimate.parameters,
             estimate.state,
@@ -189,6 +189,10 @@ class _Search:
             spread=estimate.spread,
             learnt=estimate.learnt,
         )
+        # Innovations follow the record, and tell by themselves where they diverge.
+        if self.judge.limit is not None or not np.any(estimate.spread):
+            _check_bounded(model, watch)
+        return watch
 
     def _identified(self, estimate: _Estimate, watch: Watch, alarm: Alarm) -> _Estimate:
         model, dt = self.base.model, self.base.model.dt
@@ -329,6 +333,17 @@ class _Search:
         at = self.base.model.columns(refit.names)
         spread[np.ix_(at, at)] = refit.covariance
         return spread
+
+
+def _check_bounded(model: SpringModel, watch: Watch) -> None:
+    """Raises a `ModelError` if the model diverges without an alarm: what follows is not judged."""
+    lost = np.flatnonzero(~np.isfinite(watch.states).all(axis=1))
+    if len(lost) and (watch.alarm is None or watch.alarm.sample > watch.first + lost[0]):
+        raise ModelError(
+            f"{model.structure.name}: the model diverges (NaN or infinite) at"
+            f" {(watch.first + int(lost[0])) * model.dt:g} s, expected one that stays bounded under"
+            " the record's loads: look at its cubic and quadratic coefficients"
+        )
 
 
 def _figures(refit: Refit) -> dict[str, Figure]:

@@ -41,8 +41,9 @@ class Reference:
         parameters: all of them, shape (n_p,).
         figures: the identified coefficients, those marked as unknown in the file.
         spread: covariance of the spring coefficients and the first state, shape (c + n, c + n).
-        sigma: standard deviation of each signal's residual, shape (m,).
+        sigma: standard deviation of each signal's noise, shape (m,).
         samples: number of undamaged samples used.
+        freedom: valid ones of each signal, less what was identified from them: what `sigma` is of.
     """
 
     model: SpringModel
@@ -51,6 +52,7 @@ class Reference:
     spread: FloatArray
     sigma: FloatArray
     samples: int
+    freedom: int
 
 
 def reference(
@@ -90,7 +92,9 @@ def reference(
     parameters = model.problem.start
     run = model.run(parameters, model.start(), 0, samples)
     observed = model.observed[:samples]
-    sigma = noise(run.outputs - observed, observed)
+    residual = run.outputs - observed
+    sigma = noise(residual, observed, len(names))
+    left = int(np.isfinite(residual).sum()) - len(names)
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     half = (CONFIDENCE * deviations).tolist()
     figures = {
@@ -98,7 +102,8 @@ def reference(
         for name, value, width in zip(names, values.tolist(), half, strict=True)
         if not (moving and name.endswith("(0)"))
     }
-    return Reference(model, parameters, figures, _spread(model, names, covariance), sigma, samples)
+    spread, freedom = _spread(model, names, covariance), max(left // len(sigma), 1)
+    return Reference(model, parameters, figures, spread, sigma, samples, freedom)
 
 
 def _unknowns(structure: Structure, *, known: bool, moving: bool) -> list[str]:

@@ -214,7 +214,7 @@ class _UndamagedRun:
         )
         self._learnt = base.samples
         samples = rounded(round(settings.span / dt))
-        threshold = threshold_for(settings.rate, len(base.sigma), samples, base.samples)
+        threshold = threshold_for(settings.rate, len(base.sigma), samples, base.freedom)
         self.judge = CumulativeSum(len(base.sigma), threshold)
 
     def step(self, record: GrowingRecord, row: int) -> tuple[FloatArray, bool]:

@@ -158,9 +158,10 @@ def _with_values(study: Study, values: Mapping[str, float]) -> tuple[str, ...]:
 
 
 def _told(study: Study, element: Element, values: Mapping[str, float]) -> Element:
-    prefix = element.prefix
-    own = {n for n, p in study.model.parameters.items() if p.kept and n.startswith(prefix)}
-    return replace(element, values={n[len(prefix) :]: values[n] for n in sorted(own)})
+    known = study.model.parameters
+    named = {name: element.prefix + name for name in study.effect(element.effect).parameters}
+    kept = {name: whole for name, whole in named.items() if whole in known and known[whole].kept}
+    return replace(element, values={name: values[kept[name]] for name in sorted(kept)})
 
 
 def _overall(rms: FloatArray, scale: FloatArray) -> float:

@@ -26,6 +26,8 @@ neighbours, so that the density of white noise becomes r0 + 2 r1 cos(2 pi f): it
 at a quarter of the rate, more below, less above."""
 SET_NS, MOST_DRIFT = 5e8, 1e-3
 """What a clock is set by at least [ns], and how fast or slow it may run over a gap."""
+PADDED = 15
+"""Samples by which a recording is continued at both ends before it is low-passed twice."""
 LARGEST = 1e70
 """Largest value that counts as measured [SI]: the fourth power is summed over a recording."""
 
@@ -111,6 +113,11 @@ def with_derived(columns: Columns, derive: Derive | None) -> Columns:
     if derive.low_pass >= rate / 2:
         raise ModelError(
             f"derive: found low_pass {derive.low_pass:g} Hz, expected less than half of {rate:g} Hz"
+        )
+    if len(columns) <= PADDED:
+        raise ModelError(
+            f"derive: found a recording of {len(columns)} samples, expected at least {PADDED + 1}"
+            " for its low-pass"
         )
     sections = butter(4, derive.low_pass, fs=rate, output="sos")
     found = dict(columns.values)

@@ -29,8 +29,10 @@ from rigwatch.workbench.ranking import Ranked
 from rigwatch.workbench.study import Derived
 
 DURATION = 20.0
-"""Length of the simulated recordings [s]."""
-MOST_SAMPLES = 8000
+"""Length of the simulated recordings [s], of a machine that is recorded so fast."""
+LEAST_SAMPLES, MOST_SAMPLES = 2000, 8000
+"""Samples of a simulated recording: of a slow machine as many as have been recorded, up to the
+first; of a fast one no more than the second."""
 RELEASES = (1.0, 0.7, 0.5, 0.3, 0.1)
 """Deviations that a machine without inputs is released from, over the largest so far."""
 
@@ -95,11 +97,12 @@ def _worded(
     amplitude = share * _amplitude(bench, signal)
     rival, size = min(separation.items(), key=lambda item: item[1])
     size_of = ", amplitude" if model.inputs else " from"
+    duration = _samples(bench) * bench.data.train.dt
     text = (
-        f"{name} of {signal}{size_of} {_in_words(amplitude, driven)}, {DURATION:g} s:"
+        f"{name} of {signal}{size_of} {_in_words(amplitude, driven)}, {duration:.3g} s:"
         f" {rival} would differ by {size:.3g} noise floors (on this recording: {now[rival]:.3g})"
     )
-    return Experiment(name, signal, amplitude, driven.unit, DURATION, separation, now, text)
+    return Experiment(name, signal, amplitude, driven.unit, duration, separation, now, text)
 
 
 def _in_words(amplitude: float, driven: Input | State) -> str:
@@ -135,9 +138,7 @@ def _amplitude(bench: Bench, signal: str) -> float:
 
 def _excitations(bench: Bench) -> Iterator[tuple[str, float, FloatArray, FloatArray]]:
     """Shape in words, share of the amplitude so far, inputs, and states at the first sample."""
-    dt = bench.data.train.dt
-    count = int(min(DURATION / dt, MOST_SAMPLES))
-    count = count // bench.data.horizon * bench.data.horizon or count
+    dt, count = bench.data.train.dt, _samples(bench)
     time: FloatArray = np.arange(count, dtype=np.float64) * dt
     rest = _rest(bench)
     if not bench.study.model.inputs:
@@ -152,6 +153,14 @@ def _excitations(bench: Bench) -> Iterator[tuple[str, float, FloatArray, FloatAr
             inputs = _inputs(bench, shape(time), share)
             if inputs is not None:
                 yield name, share, inputs, rest
+
+
+def _samples(bench: Bench) -> int:
+    """Samples of a simulated recording, in whole horizons if it holds one."""
+    train, horizon = bench.data.train, bench.data.horizon
+    longest = max(part.stop - part.start for part in train.slices)
+    count = int(min(max(DURATION / train.dt, min(longest, LEAST_SAMPLES)), MOST_SAMPLES))
+    return count // horizon * horizon or count
 
 
 def _inputs(bench: Bench, shape: FloatArray, share: float) -> FloatArray | None:
@@ -240,6 +249,8 @@ def _strength(row: Ranked) -> float:
 
 
 def _candidate(row: Ranked) -> Candidate:
+    """The effect with its shape as fitted, to which its strength belongs."""
     effect = row.placement.effect
-    shape = {name: value for name, value in row.start.items() if name != effect.strength}
+    values = row.placement.own(row.fitted.train.values()) if row.fitted else row.start
+    shape = {name: value for name, value in values.items() if name != effect.strength}
     return Candidate(row.effect, effect, row.port, shape)

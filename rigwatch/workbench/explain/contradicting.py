@@ -11,7 +11,7 @@ import numpy as np
 from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.explain.remaining_error import LITTLE, explains, shows_little_of_it
 from rigwatch.workbench.fit import Fitted
-from rigwatch.workbench.ranking import MATERIAL, Ranked, difference, same_family
+from rigwatch.workbench.ranking import MATERIAL, Ranked, difference, error_ratio, same_family
 
 CONTRADICTED = 2.0
 """Ratio of the training energy explained by another effect above which the best is in doubt."""
@@ -62,7 +62,6 @@ def explaining_all(
         explains(base, best, floor) and not much_in_training
     ):
         return ()
-    least = energy_of_all(best.fitted)
     return tuple(
         row.label
         for row in rows
@@ -70,10 +69,10 @@ def explaining_all(
         and row.accepted
         and row.fitted is not None
         and row.free <= best.free
-        and row.held_out_error >= best.held_out_error
+        and error_ratio(best, row) >= 1.0
         and row.label not in members
         and not same_family(best, row)
-        and energy_of_all(row.fitted) < least
+        and leaves_less_of_all(row.fitted, best.fitted)
     )
 
 
@@ -146,9 +145,14 @@ def _is_another(best: Ranked, row: Ranked) -> bool:
     return not (row is best or finer or row.label in best.alike or same_family(best, row))
 
 
-def energy_of_all(fitted: Fitted) -> float:
-    """Sum of the scaled squares of all residuals, of the training and of what is held out."""
-    return sum(
-        float(np.nansum(np.square(side.residuals / side.scale)))
-        for side in (fitted.train, fitted.held_out)
-    )
+def leaves_less_of_all(one: Fitted, other: Fitted) -> bool:
+    """Whether a fit leaves less than another of all recordings, training and held out.
+
+    By the sum of the scaled squares of the residuals at samples that count for both.
+    """
+    left = np.zeros(2)
+    for fits in ((one.train, other.train), (one.held_out, other.held_out)):
+        squares = [np.square(fit.residuals / fit.scale).ravel() for fit in fits]
+        counted = np.isfinite(squares).all(axis=0)
+        left += [float(np.sum(each[counted])) for each in squares]
+    return bool(left[0] < left[1])

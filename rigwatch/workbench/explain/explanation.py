@@ -127,7 +127,7 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         list(verdict.rivals),
         list(verdict.second),
         _experiment(bench, rows, verdict),
-        None if unlike or (similar[0] and most is None) else probability,
+        None if unlike or most is None else probability,
         similar,
         list(verdict.beside),
         compared.unit,
@@ -200,10 +200,9 @@ def _reliability(bench: Bench, verdict: Verdict) -> tuple[float | None, tuple[in
 def _row(row: Ranked, alike: list[str], more: Mapping[str, float] | None = None) -> Row:
     found: dict[str, Value] = {}
     if row.fitted is not None:
-        prefix = row.placement.prefix
         every = _with_open_strength(row, values(row.fitted.train, more))
         every = as_written(every, row.fitted.compiled.system)
-        found = {n[len(prefix) :]: v for n, v in every.items() if n.startswith(prefix)}
+        found = row.placement.own(every)
     others = [label for label in alike if label != row.label]
     return Row(
         row.effect,

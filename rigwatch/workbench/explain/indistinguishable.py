@@ -18,6 +18,7 @@ from rigwatch.workbench.ranking import (
     SAME,
     SIMILAR,
     Ranked,
+    error_ratio,
     same_family,
 )
 
@@ -102,7 +103,7 @@ def as_good(best: Ranked, rows: Sequence[Ranked], members: Sequence[str]) -> lis
 
 def _as_small(best: Ranked, row: Ranked) -> bool:
     """Whether its error is no more than a trace larger, if it is accepted."""
-    return row.accepted and row.held_out_error < (1 + A_TRACE) * best.held_out_error
+    return row.accepted and error_ratio(best, row) < 1 + A_TRACE
 
 
 def _same_shift(best: Ranked, row: Ranked) -> bool:
@@ -130,7 +131,7 @@ def _rivals(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:
     if not row.accepted:
         return False
     if row.free > best.free:
-        no_worse = row.held_out_error <= best.held_out_error * (1 + NO_DIFFERENCE)
+        no_worse = error_ratio(best, row) <= 1 + NO_DIFFERENCE
         better = cosine > SIMILAR and lead(row, best) > PERHAPS
         # At another port it does not refine the best, however many parameters its shape has.
         not_worse = row.port != best.port and equal(best, row, cosine)
@@ -195,7 +196,7 @@ def equal(one: Ranked, other: Ranked, cosine: float) -> bool:
     assert one.fitted is not None
     if not other.accepted:
         return False
-    ratio = other.held_out_error / one.held_out_error
+    ratio = error_ratio(one, other)
     if abs(ratio - 1) < NO_DIFFERENCE:
         return True
     # One that is materially ahead was passed over for its parameters: it is named next.

@@ -17,10 +17,10 @@ from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.explain.contradicting import (
     CONTRADICTED,
-    energy_of_all,
     explaining_all,
     explaining_training,
     favoured_by_training,
+    leaves_less_of_all,
     not_refuted,
 )
 from rigwatch.workbench.explain.indistinguishable import (
@@ -41,7 +41,14 @@ from rigwatch.workbench.explain.remaining_error import (
 )
 from rigwatch.workbench.explain.verdict_calibration import CLEAR, Evidence, probability_wrong
 from rigwatch.workbench.fit import Fitted
-from rigwatch.workbench.ranking import MATERIAL, NEAR, Ranked, same_family
+from rigwatch.workbench.ranking import (
+    MATERIAL,
+    NEAR,
+    Ranked,
+    error_ratio,
+    lowest,
+    same_family,
+)
 
 Word = Literal[
     "nothing_missing", "missing_effect", "undetermined", "unknown_effect", "model_inadequate"
@@ -266,9 +273,10 @@ def _named(base: Fitted, accepted: Sequence[Ranked], floor: NoiseFloor) -> Ranke
     While other physics is missing, an effect of higher order also absorbs part of that. It is named
     only if its residual is at the noise floor, or if it alone explains the error.
     """
-    top = min(accepted, key=lambda row: row.held_out_error)
+    top = lowest(accepted)
     equals = [row for row in accepted if _as_good(top, row, floor)]
-    best = min(equals, key=_simplest)
+    least = min(map(_simplicity, equals))
+    best = lowest([row for row in equals if _simplicity(row) == least])
     assert best.fitted is not None
     if floor.reached(best.fitted.held_out):
         return best
@@ -286,14 +294,14 @@ def _passed_over(best: Ranked, accepted: Sequence[Ranked]) -> Ranked | None:
     It leaves materially less of what is held out and less of all recordings. While more is missing
     that is no reason to name it, but where rivals are told it is one.
     """
-    top = min(accepted, key=lambda row: row.held_out_error)
+    top = lowest(accepted)
     same_physics = same_family(best, top) or top.placement.effect.refines == best.effect
     if top.free <= best.free or same_physics:
         return None
     assert best.fitted is not None
     assert top.fitted is not None
-    ahead = top.held_out_error < (1 - MATERIAL) * best.held_out_error
-    return top if ahead and energy_of_all(top.fitted) < energy_of_all(best.fitted) else None
+    ahead = error_ratio(best, top) < 1 - MATERIAL
+    return top if ahead and leaves_less_of_all(top.fitted, best.fitted) else None
 
 
 def _simpler_of_all(best: Ranked, accepted: Sequence[Ranked]) -> Ranked:
@@ -303,19 +311,18 @@ def _simpler_of_all(best: Ranked, accepted: Sequence[Ranked]) -> Ranked:
     beside it there, as friction that falls with speed does where a supply sags.
     """
     assert best.fitted is not None
-    least = energy_of_all(best.fitted)
     simpler = [
         row
         for row in accepted
         if row.free < best.free and same_family(best, row) and row.fitted is not None
-        if energy_of_all(row.fitted) < least
+        if leaves_less_of_all(row.fitted, best.fitted)
     ]
     return min(simpler, key=lambda row: (row.free, row.held_out_error), default=best)
 
 
-def _simplest(row: Ranked) -> tuple[int, bool, float]:
+def _simplicity(row: Ranked) -> tuple[int, bool]:
     """Order of equal effects: fewest parameters first, effects on samples last."""
-    return row.free, row.placement.effect.sampled, row.held_out_error
+    return row.free, row.placement.effect.sampled
 
 
 def _as_good(top: Ranked, row: Ranked, floor: NoiseFloor) -> bool:
@@ -328,5 +335,5 @@ def _as_good(top: Ranked, row: Ranked, floor: NoiseFloor) -> bool:
     if row is top or equal(top, row, 0.0):
         return True
     margin = MATERIAL if same_family(top, row) else LITTLE_MORE
-    little = (1 - margin) * row.held_out_error <= top.held_out_error
+    little = (1 - margin) * error_ratio(top, row) <= 1.0
     return row.free < top.free and little and not floor.reached(top.fitted.held_out)

@@ -105,8 +105,8 @@ def fit_base(
     own = {name: value for name, value in start.items() if name in study.model.parameters}
     found = fit_model(study, data, (), own, scale, multi_start=True)
     for count in range(1, len(placements) + 1):
-        waiting = tuple(placement.prefix for placement in placements[count:])
-        begin = {name: value for name, value in start.items() if not name.startswith(waiting)}
+        waiting = {p.prefix + name for p in placements[count:] for name in p.effect.parameters}
+        begin = {name: value for name, value in start.items() if name not in waiting}
         begin |= found.train.values()
         found = fit_with_retry(study, data, placements[:count], begin, scale, multi_start=True)
     return found
@@ -341,8 +341,21 @@ def _judged(  # noqa: PLR0917 -- they belong together
     judging = _may_continue(study, data)
     further = {"steps": TO_THE_END} if data.along_motion else {}
     judged = evaluate(found, data.held_out, length, substeps, initial, judging=judging, **further)
+    _check_counted(judged)
     calm = away_from_jumps(found, data.held_out, length)
     return Fitted(tuple(placements), found, judged, substeps, horizon, calm, ended)
+
+
+def _check_counted(judged: Fit) -> None:
+    """Raises a `ModelError` unless a sample of each output counts on the recordings held out."""
+    counted = np.isfinite(judged.residuals).any(axis=(0, 1))
+    if not counted.all():
+        name = list(judged.compiled.system.outputs)[int(np.argmin(counted))]
+        raise ModelError(
+            f"found no sample of {name} that counts on a recording that judges the model, expected"
+            " some: those from which its first states are found do not count, nor, along the"
+            " measured motion, those near standstill"
+        )
 
 
 def may_be_local_minimum(

@@ -26,6 +26,8 @@ SAME = 1e-6
 """Singular value, relative to the largest, below which a direction counts as undetermined."""
 POORLY_DETERMINED = 0.3
 """Relative standard deviation of a kept parameter above which a remark is given."""
+HOPELESS = 10.0
+"""Relative standard deviation above which it makes no difference how large it is."""
 NEAR_ZERO = 0.01
 """Share of its range used as a lower limit of a parameter's value in relative deviations."""
 LONGEST = 600.0
@@ -117,7 +119,7 @@ def poorly_determined(kept: Kept, model: Model, seconds: float) -> tuple[str, ..
     if not loose:
         return ()
     listed = ", ".join(
-        f"{name} ({model.parameters[name].meaning or 'a parameter'}) to {share:.0%}"
+        f"{name} ({model.parameters[name].meaning or 'a parameter'}) to {_told(share)}"
         for name, share in loose.items()
     )
     needed = seconds * (max(loose.values()) / POORLY_DETERMINED) ** 2
@@ -126,6 +128,11 @@ def poorly_determined(kept: Kept, model: Model, seconds: float) -> tuple[str, ..
         f"the healthy recording of {seconds:.3g} s determines {listed} of its value only; {longer}"
         f" would determine them to {POORLY_DETERMINED:.0%}",
     )
+
+
+def _told(share: float) -> str:
+    """A relative deviation in percent, of which a parameter that nothing determines has no end."""
+    return f"{share:.0%}" if share < HOPELESS else f"more than {HOPELESS:.0%}"
 
 
 def _scale_of(p: Parameter) -> float:

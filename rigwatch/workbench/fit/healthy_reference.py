@@ -29,7 +29,7 @@ from rigwatch.workbench.fit.fitted_model import fit_model
 from rigwatch.workbench.study import Study
 
 MAX_DIFFERENCE = 0.2
-"""Largest rms difference between an excitation and the healthy one, relative to its own rms."""
+"""Largest rms difference between an excitation and the healthy one, over its standard deviation."""
 FEWEST = 2
 """Number of healthy periods needed, so that each can be compared with another."""
 
@@ -93,7 +93,7 @@ def _matching(study: Study, bare: Fitted, recording: Recording, data: Data, use:
             f"{use}: found a period of {period} samples, expected a multiple of the horizon"
             f" of {horizon}"
         )
-    starts = _starts(recording.inputs[:period, 0], healthy.inputs[:, 0])
+    starts = _starts(recording.inputs[:period], healthy.inputs)
     if len(starts) < FEWEST:
         raise ModelError(
             f"{use}: found its excitation {len(starts)} times in the healthy recording, expected"
@@ -104,22 +104,38 @@ def _matching(study: Study, bare: Fitted, recording: Recording, data: Data, use:
     return _Periods(healthy.inputs[rows], healthy.outputs[rows], np.array(left))
 
 
-def _starts(period: FloatArray, signal: FloatArray) -> FloatArray:
-    """Samples of a longer signal at which the period begins, shape (times found,)."""
-    length = len(period)
-    if len(signal) < length:
+def _starts(period: FloatArray, signals: FloatArray) -> FloatArray:
+    """Samples of longer signals at which the period begins, shape (times found,).
+
+    Args:
+        period: all inputs, shape (n, inputs); those that do not change are not compared.
+        signals: the same of the healthy recording, shape (longer, inputs).
+    """
+    length, changing = len(period), np.flatnonzero(np.ptp(period, axis=0) > 0.0)
+    if len(signals) < length or not len(changing):
         return np.zeros(0, dtype=np.int64)
-    squares = np.concatenate([[0.0], np.cumsum(signal**2)])
-    energy = squares[length:] - squares[:-length]
-    own = float(period @ period)
-    unlike = energy + own - 2 * correlate(signal, period, mode="valid")
+    each = [_unlike(period[:, column], signals[:, column]) for column in changing]
+    unlike = np.max(each, axis=0)
     found: list[int] = []
     for start in np.argsort(unlike):
-        if unlike[start] > MAX_DIFFERENCE**2 * own:
+        if unlike[start] > MAX_DIFFERENCE**2:
             break
         if all(abs(int(start) - other) >= length for other in found):
             found.append(int(start))
     return np.array(sorted(found), dtype=np.int64)
+
+
+def _unlike(period: FloatArray, signal: FloatArray) -> FloatArray:
+    """Mean square difference from a longer signal by where the period begins, over its variance.
+
+    About its mean: an input that moves little about a large value is like any other one there.
+    """
+    length, mean = len(period), float(period.mean())
+    own, signal = period - mean, signal - mean
+    squares = np.concatenate([[0.0], np.cumsum(signal**2)])
+    energy = squares[length:] - squares[:-length]
+    size = float(own @ own)
+    return np.asarray((energy + size - 2 * correlate(signal, own, mode="valid")) / size)
 
 
 def _left(bare: Fitted, healthy: Recording, row: FloatArray, horizon: int) -> FloatArray:

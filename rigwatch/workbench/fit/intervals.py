@@ -10,6 +10,7 @@ cluster-robust covariance "CR3": R. M. Bell, D. F. McCaffrey, Survey Methodology
 with N = JᵀJ, Nb = JbᵀJb and gb = Jbᵀrb of B blocks. A parameter that shows in a few blocks only, as
 a stop that is seldom reached, has a variance of few degrees of freedom. Student's t therefore has
 those of each variance, after Satterthwaite for independent residuals (Bell and McCaffrey, 2002).
+Without the only block in which a parameter shows there is no θ₋b: see `lone_blocks.py`.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -24,6 +25,7 @@ from rigwatch.physics.engine.score import autocorrelation, correlation_time
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.units import unit_of
 from rigwatch.workbench.fit.fitted import blocks
+from rigwatch.workbench.fit.lone_blocks import TOLD, lost, with_lone_blocks_divided
 
 CONFIDENCE = 0.95
 ENOUGH = 12
@@ -91,14 +93,17 @@ def covariance(fitted: Fit, repeat: int = 0) -> tuple[FloatArray, FloatArray]:
     # Columns are scaled to equal norm, so that small ones are not truncated as rank-deficient.
     size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
     whole = whole / size
-    number = block_numbers(fitted, repeat)
-    parts = [np.flatnonzero(number == block) for block in range(int(number.max()) + 1)]
+    sample = np.arange(error.size) // len(fitted.scale)
+    order = sample % repeat if repeat else sample
+    parts = with_lone_blocks_divided(whole, error, block_numbers(fitted, repeat), order)
     own = np.array([whole[rows].T @ whole[rows] for rows in parts])
     normal = whole.T @ whole
-    rest = np.array([np.linalg.pinv(normal - each, rcond=1e-12) for each in own])
+    rest = np.linalg.pinv(normal - own, rcond=TOLD)
     slopes = np.array([whole[rows].T @ error[rows] for rows in parts])
     moved = np.clip(np.einsum("bij,bj->bi", rest, slopes) / size, -FARTHEST, FARTHEST)
     spread = moved.T @ moved * ((len(parts) - 1) / len(parts))
+    lone = np.any(lost(normal - own) & ~lost(normal), axis=0)
+    spread[lone, lone] = FARTHEST**2
     return np.asarray(spread), _degrees_of_freedom(normal, own, rest)
 
 
@@ -113,7 +118,7 @@ def _degrees_of_freedom(normal: FloatArray, own: FloatArray, rest: FloatArray) -
         own: Nb of each block, shape (blocks, m, m).
         rest: (N − Nb)⁻¹, shape (blocks, m, m).
     """
-    inverse = np.linalg.pinv(normal, rcond=1e-12)
+    inverse = np.linalg.pinv(normal, rcond=TOLD)
     found = np.ones(len(normal))
     for index in range(len(normal)):
         u = rest[:, :, index]

@@ -74,9 +74,9 @@ def _end(search: _Search, name: str, step: float) -> float:
         if at != value + step and rise < search.allowed:
             return at
         if abs(rise / search.allowed - 1) < CLOSE:
-            break
+            return at
         step *= float(np.clip(np.sqrt(search.allowed / rise), 0.3, 3.0))
-    return value + step
+    return float(np.clip(value + step, parameter.low, parameter.high))
 
 
 def _error(search: _Search, name: str, at: float) -> float:

@@ -26,7 +26,9 @@ from rigwatch.workbench.ranking.ranked import (
     SIMILAR,
     Ranked,
     accepted_from,
+    error_ratio,
     in_order,
+    lowest,
     same_family,
 )
 from rigwatch.workbench.ranking.refinements import (
@@ -66,11 +68,13 @@ __all__ = [
     "denied_sensors",
     "denies_gain",
     "difference",
+    "error_ratio",
     "fit_started",
     "in_order",
     "judge_fit",
     "leaves_only_noise",
     "left_over",
+    "lowest",
     "neutral_strength",
     "no_progress",
     "order_of",

@@ -31,11 +31,11 @@ NEAR = 2.0
 def judge_fit(base: Fitted, row: Ranked) -> None:
     """Accept the row if its held-out error falls by more than chance and its strength is nonzero.
 
-    Sets the row's `gain`, `accepted` and `reason`.
+    Sets the row's `gain`, `accepted`, `reason` and `vague`.
     """
     assert row.fitted is not None
     found = difference(base.held_out, row.fitted.held_out)
-    row.gain, row.reason = found.mean, _refused(found)
+    row.gain, row.reason, row.vague = found.mean, _refused(found), False
     if row.fitted.train_error > (1 + MATERIAL) * base.train_error:
         row.reason = "its fit ended in a local minimum: the training error rises"
     if not row.reason and (vague := _undetermined_strength(row)) is not None:

@@ -35,11 +35,13 @@ def select_for_fit(
     kept_rows: dict[str, Ranked] = {}
     for row in likely:
         similar = _fitted_instead(row, kept_rows, likely)
+        reason = "explains less than others; not fitted"
         if similar is None:
             kept_rows[row.label] = row
-            row.reason = "explains less than others; not fitted"
         else:
-            row.fitted_instead, row.reason = similar, f"looks like {similar}; not fitted"
+            row.fitted_instead, reason = similar, f"looks like {similar}; not fitted"
+        if row.fitted is None:
+            row.reason = reason
     chosen = list(kept_rows.values())[: MOST_FITS[kind]]
     for port_kind in ("force", "actuator", "sensor"):
         first = next((row for row in kept_rows.values() if row.kind == port_kind), None)

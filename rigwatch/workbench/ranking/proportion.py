@@ -50,7 +50,7 @@ def proportion(recording: Recording, rate: int) -> Proportion | None:
     if not left <= ALIKE * float(np.std(x)):
         return None
     pieces = zip(np.array_split(x, BLOCKS), np.array_split(y, BLOCKS), strict=True)
-    spread = float(np.std([_ratio(*piece) for piece in pieces]))
+    spread = float(np.std([_ratio(*piece) for piece in pieces], ddof=1))
     return Proportion(value, spread / np.sqrt(BLOCKS))
 
 
@@ -70,7 +70,8 @@ def denies_gain(healthy: Recording, test: Recording, rate: int, gain: float) -> 
     if before is None or after is None or not min(before.value, after.value, gain) > 0.0:
         return ""
     changed = float(np.log(after.value / before.value))
-    unsure = ROUGH + SURE * float(np.hypot(before.deviation, after.deviation))
+    relative = [each.deviation / each.value for each in (before, after)]
+    unsure = ROUGH + SURE * float(np.linalg.norm(relative))
     expected = float(np.log(gain))
     if abs(expected - changed) <= max(unsure, (1.0 - SEEN) * abs(expected)):
         return ""

@@ -8,6 +8,7 @@ import numpy as np
 from rigwatch.physics.engine.equations import EffectParameter, Placement
 from rigwatch.physics.engine.score import Candidate, Standing
 from rigwatch.workbench.fit import Fitted
+from rigwatch.workbench.ranking.paired_test import difference
 from rigwatch.workbench.study import Accepted
 
 SAME = 0.9995
@@ -132,15 +133,33 @@ def _within(p: EffectParameter, strength: float) -> float:
     return 1.0 if p.role == "switch" else float(np.clip(p.neutral + strength, p.low, p.high))
 
 
+def error_ratio(one: Ranked, other: Ranked) -> float:
+    """Held-out error of another fitted row over that of one, on the samples that count for both.
+
+    Samples from which the states of an effect are found do not count for it.
+    """
+    assert one.fitted is not None
+    assert other.fitted is not None
+    own, others = one.fitted.held_out, other.fitted.held_out
+    one_counts, other_counts = (np.isfinite(fit.residuals).ravel() for fit in (own, others))
+    if np.array_equal(one_counts, other_counts):
+        return other.held_out_error / one.held_out_error
+    return 1.0 - difference(own, others).relative
+
+
+def lowest(rows: Sequence[Ranked]) -> Ranked:
+    """The fitted row with the smallest held-out error, each two compared where both count."""
+    found = min(rows, key=lambda row: row.held_out_error)
+    for row in rows:
+        if row is not found and error_ratio(found, row) < 1.0:
+            found = row
+    return found
+
+
 def accepted_from(row: Ranked) -> Accepted:
     """The row as an entry of the study's file, with its fitted parameters."""
     assert row.fitted is not None
-    prefix = row.placement.prefix
-    values = {
-        name[len(prefix) :]: value
-        for name, value in row.fitted.train.values().items()
-        if name.startswith(prefix)
-    }
+    values = row.placement.own(row.fitted.train.values())
     placed = row.fitted.placements[-1]
     return Accepted(
         effect=row.effect, port=row.port, parameters=values, ahead=placed.ahead,

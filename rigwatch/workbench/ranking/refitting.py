@@ -56,7 +56,7 @@ def refit(
     if not fits:
         row.reason, row.failure = "cannot be fitted", failures[0]
         return
-    row.fitted = min(fits, key=lambda fitted: fitted.train_error)
+    row.fitted, row.failure = min(fits, key=lambda fitted: fitted.train_error), ""
     judge_fit(base, row)
 
 
@@ -122,7 +122,8 @@ def fit_each(  # noqa: PLR0917 -- they belong together
     ahead: dict[str, Ranked] = {}
     for number, row in enumerate(rows, start=1):
         if any(_is_unlike(row, other) for other in enough):
-            row.reason = f"unlike {enough[0].label}, which explains {EXPLAINED:.0%}; not fitted"
+            if row.fitted is None:
+                row.reason = f"unlike {enough[0].label}, which explains {EXPLAINED:.0%}; not fitted"
             continue
         if row.fitted is None:
             progress(f"fitting {row.label}, {number} of at most {len(rows)}")

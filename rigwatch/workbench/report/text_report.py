@@ -15,6 +15,11 @@ VERDICTS = {
     "unknown_effect": "something is missing that no known effect explains",
     "model_inadequate": "the model is inadequate for this recording: no effect is named",
 }
+BEYOND = (
+    "the recordings ask for the bound's value or one beyond it, and the interval does not hold"
+    " there; if the bound is the machine's own, the model may lack something"
+)
+"""What it means that a parameter is on a bound."""
 MOST_ROWS = 12
 """Rows of a printed ranking; `--json` has all."""
 
@@ -84,7 +89,7 @@ def fit_lines(found: Comparison) -> list[str]:
         (ended.at_bound, "on a bound:"),
     ):
         lines += [f"  {what} {', '.join(names)}"] if names else []
-    return lines
+    return lines + ([f"    {BEYOND}"] if ended.at_bound else [])
 
 
 def _held(held: Held) -> str:

@@ -46,6 +46,8 @@ def replay(study: Study, progress: Callable[[str], None] = lambda _: None) -> li
                 port=line["port"],
                 parameters=line["parameters"],
                 model=line.get("model_parameters", {}),
+                ahead=line.get("ahead", False),
+                beyond=line.get("beyond", ""),
             )
         if line["step"] not in ("add", "undo"):
             continue

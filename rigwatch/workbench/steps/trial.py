@@ -144,7 +144,12 @@ def try_add(
         if not anyway:
             words = f"{_falls(row, before, found)}, but {row.reason}"
             return _refused(study, row, others, before, words)
-    line = {"parameters": accepted.parameters, "model_parameters": accepted.model}
+    line: dict[str, Any] = {
+        "parameters": accepted.parameters,
+        "model_parameters": accepted.model,
+        "ahead": accepted.ahead,
+        "beyond": accepted.beyond,
+    }
     line |= _evidence(in_set) | ({} if supported else {"reason": f"added anyway: {row.reason}"})
     errors, text = (after.train_error, again), _falls(row, before, again)
     text = f"{text}; {in_set.text(before.told_in)}" if in_set is not None else text
@@ -277,12 +282,9 @@ def accepted_with_model(row: Ranked) -> Accepted:
     """The effect as an entry of the study's file, with the model's values fitted beside it."""
     assert row.fitted is not None
     own, fit = accepted_from(row), row.fitted.train
-    free = set(fit.compiled.system.free)
-    rest = {
-        name: value
-        for name, value in fit.values().items()
-        if name in free and not name.startswith(row.placement.prefix)
-    }
+    known = {row.placement.prefix + name for name in own.parameters}
+    free = set(fit.compiled.system.free) - known
+    rest = {name: value for name, value in fit.values().items() if name in free}
     return structs.replace(own, model=rest)
 
 

@@ -1,5 +1,7 @@
 """Two sensors of one motion deny a gain of either that their proportion does not show."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,3 +43,17 @@ def test_a_gain_that_is_there_or_too_small_to_be_seen_is_not(gain: float) -> Non
 
 def test_an_output_that_does_not_show_the_motion_denies_nothing() -> None:
     assert not denies_gain(read(1.0, 1, hidden=False), read(1.0, 2), RATE_COLUMN, 1.06)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_whether_it_is_denied_does_not_depend_on_the_units_of_the_other_sensor(
+    scale: float,
+) -> None:
+    def rough(gain: float, seed: int) -> Recording:
+        """Its acceleration read as a force, with a proportion that changes by 3 % in between."""
+        found = read(gain, seed)
+        drifting = 1 + 0.03 * np.sin(2 * np.pi * np.arange(len(found)) / 900)
+        return replace(found, outputs=scale * drifting[:, None] * found.outputs)
+
+    assert denies_gain(rough(1.0, 1), rough(1.0, 2), RATE_COLUMN, 1.2)
+    assert not denies_gain(rough(1.0, 1), rough(1.0, 2), RATE_COLUMN, 1.02)

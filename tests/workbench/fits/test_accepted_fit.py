@@ -14,6 +14,7 @@ from rigwatch.workbench.steps.change import add, undo
 from rigwatch.workbench.steps.ledger_replay import replay
 from rigwatch.workbench.steps.trial import keeps_gain
 from rigwatch.workbench.study.study import Study, open_study
+from tests.workbench.dampers import damper
 from tests.workbench.machine import studied
 
 WAVES = """
@@ -132,3 +133,50 @@ def test_an_unknown_parameter_of_an_accepted_effect_is_refused_with_those_that_i
     file.write_text(file.read_text("utf-8").replace("{ F0 =", "{ F ="), "utf-8")
     with pytest.raises(ModelError, match=r"load_constant_force_F', .*load_constant_force_F0"):
         open_bench(open_study(study.folder))
+
+
+def by_direction(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Dry friction of 0.3 N more one way than the other."""
+    return np.asarray(0.8 * np.sign(v) + 0.3 * np.abs(np.sign(v)))
+
+
+def test_an_effect_has_no_parameters_of_another_whose_name_begins_like_its_own(
+    tmp_path: Path,
+) -> None:
+    study = damper(tmp_path, by_direction)
+    add(study, "coulomb_by_direction", anyway=True)
+    change = add(open_study(study.folder), "coulomb")
+    assert change.step == "add"
+    last = open_study(study.folder).file.effects[-1]
+    assert {*last.parameters} == {"Fc", "vs"}
+    assert {"load_coulomb_by_direction_dF", "c"} <= {*last.model}
+
+
+VALVE = """
+name = "valve"
+summary = "A flow in proportion to what passes a valve."
+inputs.u = { unit = "V", hold = "zero" }
+parameters.k = { value = 1.0, unit = "m^3/(s*V)" }
+outputs.flow = { unit = "m^3/s", expression = "k*drive" }
+ports.drive = { kind = "actuator", signal = "u" }
+"""
+
+
+def overlapped(seed: int) -> dict[str, np.ndarray]:
+    """A valve whose zero is off by 0.4 V, before its overlap of 0.5 V."""
+    u = 3.0 * np.sin(np.arange(400) / (9 + seed)) + np.sin(np.arange(400) / 3.1)
+    moved = u + 0.4
+    passed = np.sign(moved) * np.maximum(np.abs(moved) - 0.5, 0.0)
+    return {"u": u, "flow": 2 * passed + 0.01 * np.random.default_rng(seed).normal(size=400)}
+
+
+def test_the_ledger_repeats_an_effect_that_a_signal_passes_before_an_earlier_one(
+    tmp_path: Path,
+) -> None:
+    units = {"u": "V", "flow": "m^3/s"}
+    study = studied(tmp_path, VALVE, [overlapped(0)], [overlapped(1)], units)
+    add(study, "dead_band", anyway=True)
+    add(open_study(study.folder), "offset", "drive")
+    again = open_study(study.folder)
+    assert again.file.effects[-1].ahead
+    assert [check.same for check in replay(again)] == [True, True]

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.explain import explain
 from rigwatch.workbench.fit.training import continued_train_error
@@ -97,6 +98,14 @@ def test_a_hidden_current_goes_on_from_the_window_before(tmp_path: Path) -> None
     assert np.isnan(left[0]).all()
     assert np.isfinite(left[1:]).all()
     assert bench.base.held_out_error == pytest.approx(0.01, rel=0.15)
+
+
+def test_a_channel_that_ends_before_the_samples_that_count_is_reported(tmp_path: Path) -> None:
+    made = [wound(seed, 0.0) for seed in range(2)]
+    made[1]["v"][40:] = np.nan
+    study = studied(tmp_path, CURRENT + PORT, made[:1], made[1:], UNITS, "horizon = 0.5")
+    with pytest.raises(ModelError, match="found no sample of v that counts"):
+        open_bench(study)
 
 
 def test_with_a_hidden_current_friction_is_named(tmp_path: Path) -> None:

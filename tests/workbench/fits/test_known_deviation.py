@@ -5,13 +5,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
+from rigwatch.physics.engine.equations import shipped_models
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.compare import Comparison, compare
 from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.compare.uncertainty_budget import added_variances
 from rigwatch.workbench.compare.unweighed import unweighed
-from rigwatch.workbench.study.study import Study, open_study
+from rigwatch.workbench.fit import poorly_determined
+from rigwatch.workbench.study.study import Kept, Study, open_study
 from tests.workbench.machine import Table, recorded, studied
 
 MODEL = """
@@ -129,3 +132,12 @@ def test_a_healthy_recording_says_what_it_leaves_open(tmp_path: Path) -> None:
     ]
     assert said
     assert "s of such a motion would determine" in said[0]
+
+
+def test_a_parameter_that_nothing_determines_has_no_percentage_of_its_own() -> None:
+    model = shipped_models()["mass-spring-damper"]
+    name = next(iter(model.parameters))
+    kept = structs.replace(model.parameters[name], kept=True)
+    model = structs.replace(model, parameters={**model.parameters, name: kept})
+    (said,) = poorly_determined(Kept((name,), np.array([[1e140]])), model, 3.0)
+    assert "to more than 1000% of its value only; another motion" in said

@@ -19,6 +19,7 @@ from rigwatch.workbench.data.noise.noise_floor import (
     repeats_at_once,
 )
 from rigwatch.workbench.data.noise.quietest_band import quietest_band
+from rigwatch.workbench.data.noise.rounding import rounding
 from rigwatch.workbench.data.repeats import repeat_of
 from rigwatch.workbench.study import Study
 
@@ -139,3 +140,50 @@ def test_repeats_count_from_the_second_step_on_for_outputs_that_follow_at_once(
         file=SimpleNamespace(effects=[None] * effects),
     )
     assert repeats_at_once(cast("Study", study)) == counts
+
+
+def repeated(levels: tuple[float, ...], step: float = 0.0) -> tuple[Fit, Recording]:
+    """A tone that repeats after 100 samples, in recordings of other sizes and phases.
+
+    What a wrong model leaves of it is a tenth of it.
+
+    Args:
+        levels: amplitude of each recording; the next begins a quarter of a period later.
+        step: of the converter, which then hides the noise; 0 for noise without a converter.
+    """
+    n, draw = np.arange(1000), np.random.default_rng(7)
+    tones = [a * np.sin(2 * np.pi * n / 100 + np.pi / 2 * k) for k, a in enumerate(levels)]
+    noise = [NOISE * draw.normal(size=len(n)) for _ in levels]
+    outputs = [
+        np.round(t / step) * step if step else t + e for t, e in zip(tones, noise, strict=True)
+    ]
+    left = np.concatenate([y - 0.9 * t for y, t in zip(outputs, tones, strict=True)])[None, :, None]
+    runs = [
+        Recording(1 / RATE, t[:, None], y[:, None]) for t, y in zip(tones, outputs, strict=True)
+    ]
+    fitted = SimpleNamespace(residuals=left, rms=np.sqrt(np.mean(left**2, axis=(0, 1))))
+    return cast("Fit", fitted), joined(runs)
+
+
+@pytest.mark.parametrize("levels", [(1.0,), (1.0, 0.2), (1.0, 0.6, 0.3)])
+def test_periods_are_compared_within_a_recording(levels: tuple[float, ...]) -> None:
+    fitted, recording = repeated(levels)
+    floor = from_residual(fitted, recording, 100 / RATE, len(recording))
+    assert floor.method == "periods"
+    assert floor.rms == pytest.approx([NOISE], rel=0.05)
+    assert floor.ratio(fitted) > 5
+
+
+def test_a_converter_that_hides_the_noise_leaves_what_it_rounds() -> None:
+    step = 0.02
+    fitted, recording = repeated((1.0,), step)
+    floor = from_residual(fitted, recording, 0.0, len(recording))
+    assert floor.method == "periods"
+    assert floor.rms == pytest.approx([step / np.sqrt(12)], rel=1e-6)
+
+
+def test_of_a_channel_that_is_not_rounded_nothing_is_taken() -> None:
+    _, recording = repeated((1.0,))
+    assert np.all(rounding(recording) < 1e-2 * NOISE)
+    still = Recording(1 / RATE, recording.inputs, np.full((len(recording), 1), 3.0))
+    assert rounding(still) == pytest.approx([0.0])

@@ -162,6 +162,44 @@ def test_a_parameter_that_shows_in_few_windows_has_the_interval_of_few_degrees_o
     assert covariance(left)[1][0] < 4
 
 
+def lone(fitted: Fit, shown: FloatArray, memory: float, noise: FloatArray) -> tuple[float, Value]:
+    """What a parameter seems to be that only the eighth window shows, and its interval.
+
+    Args:
+        fitted: any fit with one free parameter.
+        shown: how it moves each sample of that window, shape (samples,).
+        memory: share of the error that the next sample keeps.
+        noise: of all windows, shape (20, samples).
+    """
+    slopes = np.zeros((20, len(shown), 1))
+    slopes[7, :, 0] = shown
+    error = lfilter([np.sqrt(1 - memory**2)], [1.0, -memory], noise, axis=1)
+    moved = float(np.sum(slopes[..., 0] * error) / np.sum(slopes**2))
+    left = replace(fitted, error=error - moved * slopes[..., 0], jacobian=slopes)
+    return moved, values(left)[STRENGTH]
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.7])
+def test_a_parameter_that_one_window_alone_shows_has_the_interval_of_its_parts(
+    memory: float,
+) -> None:
+    fitted, random, hits, widths = found_in(0)[0], np.random.default_rng(4), [], []
+    for _ in range(300):
+        moved, value = lone(fitted, np.ones(256), memory, random.normal(size=(20, 256)))
+        hits.append(abs(moved) <= half_width(value) * value.value)
+        widths.append(half_width(value) * value.value)
+    assert 0.9 <= np.mean(hits) <= 0.995
+    # With the noise known, 1.96 standard deviations.
+    known = 1.96 * np.sqrt((1 + memory) / (1 - memory) / 256)
+    assert known < np.median(widths) < 2.5 * known
+
+
+def test_a_parameter_that_a_single_sample_shows_has_none() -> None:
+    noise = np.random.default_rng(5).normal(size=(20, 16))
+    _, value = lone(found_in(0)[0], np.eye(16)[3], 0.0, noise)
+    assert half_width(value) > 1e9
+
+
 def test_errors_that_last_longer_than_a_block_do_not_narrow_an_interval() -> None:
     fitted = found_in(0)[0]
     random = np.random.default_rng(5)

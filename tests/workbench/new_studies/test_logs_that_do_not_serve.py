@@ -81,6 +81,13 @@ def test_a_known_value_out_of_its_bounds_is_refused_at_once(tmp_path, run, capsy
     assert not (tmp_path / "study").exists()
 
 
+@pytest.mark.parametrize("option", ["J=nan", "run:J=nan", "J=inf"])
+def test_a_known_value_that_is_no_number_is_refused(tmp_path, run, capsys, option):
+    assert new(tmp_path, written(tmp_path / "run.csv", run), "--set", option) == 2
+    value = option.rpartition("=")[2]
+    assert f"--set: found J = {value}, expected a finite number" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("option", ["R=-2", "run:R=-2"])
 def test_a_fixed_value_out_of_its_bounds_is_refused_at_once(tmp_path, run, capsys, option):
     data, study = written(tmp_path / "run.csv", run), tmp_path / "study"

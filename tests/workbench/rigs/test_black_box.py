@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.explain import ranking
+from rigwatch.workbench.fit.healthy_reference import _starts
 from rigwatch.workbench.study.study import Study
 from rigwatch.workbench.study.study_file import Accepted
 from tests.workbench.black_box import TEMPLATE, record
@@ -83,3 +85,15 @@ def test_an_effect_that_cannot_vanish_does_not_raise_the_floor(tmp_path):
     added = open_bench(opened.with_effects([Accepted(effect="lag", port="drive")]))
     assert (added.floor.rms <= alone.floor.rms * (1 + 1e-9)).all()
     assert added.base.held_out_error < alone.base.held_out_error
+
+
+def test_an_input_about_a_large_value_is_compared_by_how_it_moves() -> None:
+    n = np.arange(600)
+    period = 5.0 + 0.3 * np.sin(2 * np.pi * n[:100] / 100)
+    same, other = 5.0 + 0.3 * np.sin(2 * np.pi * (n - 30) / 100), 5.0 + 0.3 * np.sin(n / 3.0)
+    assert _starts(period[:, None], same[:, None]).tolist() == [30, 130, 230, 330, 430]
+    assert not len(_starts(period[:, None], other[:, None]))
+    both = np.column_stack([same, other])
+    assert not len(_starts(np.column_stack([period, period]), both)), "the second input differs"
+    still = np.column_stack([same, np.full(len(n), 2.0)])
+    assert len(_starts(np.column_stack([period, np.full(100, 2.0)]), still)) == 5

@@ -151,6 +151,16 @@ def test_the_same_study_in_other_units_has_the_same_fit(pair: tuple[Study, Study
     assert told[1:3] == ["kN", f"{other.train_error / 1e3:.4g}"]
 
 
+def test_what_a_parameter_on_a_bound_means_is_said(pair: tuple[Study, Study]) -> None:
+    found = compare(pair[0])
+    assert found.convergence is not None
+    ended = replace(found.convergence, at_bound=("k",))
+    lines = comparison_lines(replace(found, convergence=ended))
+    place = lines.index("  on a bound: k")
+    assert "ask for the bound's value or one beyond it" in lines[place + 1]
+    assert not any("beyond it" in line for line in comparison_lines(found))
+
+
 def test_the_same_study_in_other_units_has_the_same_verdict(pair: tuple[Study, Study]) -> None:
     si, other = map(explain, pair)
     assert si.verdict == other.verdict

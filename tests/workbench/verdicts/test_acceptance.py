@@ -8,16 +8,18 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import open_bench
 from rigwatch.workbench.explain.explain import explain
 from rigwatch.workbench.explain.explanation import explanation
 from rigwatch.workbench.explain.verdict import Verdict
-from rigwatch.workbench.ranking import rank_only, refit, shapes_of
+from rigwatch.workbench.ranking import candidates, rank, rank_only, refit, scored, shapes_of
 from rigwatch.workbench.ranking.paired_test import difference
 from rigwatch.workbench.report import explanation_lines
 from rigwatch.workbench.steps.change import add
 from tests.workbench.dampers import damper, effect
 from tests.workbench.machine import studied
+from tests.workbench.simulated import knowing
 from tests.workbench.studies.test_own_model import PORT, SPEED, UNITS
 
 SAMPLES = 2000
@@ -170,3 +172,30 @@ def test_two_effects_are_named_of_which_neither_is_much_like_the_residual(tmp_pa
     assert found.verdict == "missing_effect"
     assert {found.ranking[0].effect, *found.also} >= {"periodic_force"}
     assert "coulomb@load" in {*found.beside, *found.also}
+
+
+def test_a_fit_that_succeeds_leaves_nothing_of_one_that_failed_before(tmp_path: Path) -> None:
+    bench = open_bench(damper(tmp_path, lambda x, v: 0.8 * np.sign(v)))
+    every = scored(bench.study, bench.data, bench.base, candidates(bench.study, bench.data.train))
+    row = next(row for row in every if row.label == "coulomb@load")
+
+    def failing(*_: Any, **__: Any) -> Any:
+        raise ModelError("it diverges")
+
+    refit(bench.study, bench.data, bench.base, row, failing)
+    assert row.failure == "it diverges"
+    row.vague = True
+    refit(bench.study, bench.data, bench.base, row)
+    assert row.accepted
+    assert not row.failure
+    assert not row.vague
+
+
+def test_a_second_pass_tells_of_a_fit_what_the_first_has_told(tmp_path: Path) -> None:
+    bench = open_bench(damper(tmp_path, lambda x, v: 0.8 * np.sign(v)))
+    study = knowing(bench.study, "coulomb", "linear_stiffness", "cubic_stiffness", "constant_force")
+    first = rank(study, bench.data, bench.base, bench.floor)
+    told = {row.label: row.reason for row in first if row.fitted is not None}
+    assert told["coulomb@load"] == "held-out error falls"
+    again = rank(study, bench.data, bench.base, bench.floor, known=first)
+    assert {row.label: row.reason for row in again if row.label in told} == told

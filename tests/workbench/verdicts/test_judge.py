@@ -11,6 +11,7 @@ from rigwatch.physics.engine.equations import Placement
 from rigwatch.physics.engine.fit import Fit
 from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.data import RESAMPLED, NoiseFloor
+from rigwatch.workbench.explain.contradicting import explaining_all, leaves_less_of_all
 from rigwatch.workbench.explain.credibility import unless_resampled
 from rigwatch.workbench.explain.indistinguishable import undistinguished
 from rigwatch.workbench.explain.remaining_error import remaining_share
@@ -910,3 +911,36 @@ def test_an_effect_far_better_within_the_models_own_error_has_no_rival() -> None
     lag = best("lag@sensor", 0.7, cosines={"gain@drive": 0.9})
 
     assert judge(base(3.0), [lag, row("gain@drive", 0.99, behind=9.0)], MOTION).rivals == ()
+
+
+# ---- where samples tell the states of an effect, and do not count for it -----------------------
+
+
+def beginning_badly(found: Ranked, error: float = np.nan) -> Ranked:
+    """The row with another error in the first four windows, which may not count for it."""
+    assert found.fitted is not None
+    residuals = found.fitted.held_out.residuals.copy()
+    residuals[:4] = error
+    fit = replace(found.fitted.held_out, residuals=residuals)
+    found.fitted = replace(found.fitted, train=fit, held_out=fit)
+    return found
+
+
+def test_an_effect_is_not_named_for_the_samples_that_do_not_count_for_it() -> None:
+    better = beginning_badly(row("coulomb@load", 1.0), 10.0)
+    worse = beginning_badly(row("dahl@other", 1.3))
+    assert worse.held_out_error < better.held_out_error
+    for rows in ([better, worse], [worse, better]):
+        found = judge(base(), rows, PERIODS)
+        assert found.best is better
+        assert "dahl@other" not in found.rivals
+
+
+def test_nor_is_it_a_rival_for_them() -> None:
+    named = beginning_badly(best(error=2.0), 2.5)
+    other, less = beginning_badly(row("dahl@other", 2.1)), beginning_badly(row("lag@other", 1.9))
+    assert not explaining_all(base(), named, (), [named, other], PERIODS)
+    assert named.fitted is not None
+    for each, leaves_less in ((other, False), (less, True)):
+        assert each.fitted is not None
+        assert leaves_less_of_all(each.fitted, named.fitted) is leaves_less

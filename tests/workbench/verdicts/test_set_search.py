@@ -1,5 +1,6 @@
 """Which sets of effects the search extends, and which effects their members are compared with."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -9,8 +10,10 @@ import pytest
 
 from rigwatch.physics.engine.equations.system import Placement
 from rigwatch.workbench.compare import open_bench
+from rigwatch.workbench.explain import with_whole_library
 from rigwatch.workbench.explain.sets.combination import Combination, best_in_training, with_rows
 from rigwatch.workbench.explain.sets.combinations import _substitutes
+from rigwatch.workbench.explain.sets.enlarging import scored_with
 from rigwatch.workbench.explain.sets.several_effects import _judge_each, _ranked_with
 from rigwatch.workbench.ranking import candidates, no_progress, rank, refit, scored
 from rigwatch.workbench.ranking.rank import _substitute_of_vague, _unfitted_similar
@@ -129,3 +132,21 @@ def test_a_needless_effect_is_left_out_of_a_set_before_the_others_are_judged(
     assert better is not None
     assert better.labels == {"cubic_stiffness@load", "coulomb@load"}
     assert not parts
+
+
+def test_a_second_pass_extends_the_sets_of_the_first_by_rarer_effects(tmp_path: Path) -> None:
+    bench = open_bench(damper(tmp_path, lambda x, v: 0.8 * np.sign(v)))
+    row = next(
+        row
+        for row in scored(
+            bench.study, bench.data, bench.base, candidates(bench.study, bench.data.train)
+        )
+        if row.label == "coulomb@load"
+    )
+    refit(bench.study, bench.data, bench.base, row)
+    usual = {each.effect for each in scored_with(bench, Combination((row,)))}
+    wider = replace(bench, study=with_whole_library(bench.study))
+    rarer = {each.effect for each in scored_with(wider, Combination((row,)))} - usual
+    assert rarer
+    assert all(bench.study.effects[name].elective for name in rarer)
+    assert usual == {each.effect for each in scored_with(bench, Combination((row,)))}

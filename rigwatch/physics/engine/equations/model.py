@@ -110,6 +110,8 @@ class Parameter(Section, frozen=True, kw_only=True):
         name = self.shown or self.unit
         unit = unit_of(name)
         value = float(unit.to_si(written))
+        if not math.isfinite(value):
+            return "a finite number"
         kept = self.low <= value <= self.high
         if kept or math.isclose(value, self.low) or math.isclose(value, self.high):
             return ""

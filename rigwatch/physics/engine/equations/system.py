@@ -8,6 +8,7 @@ applied in sequence, in the order of placement unless they are placed ahead.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TypeVar
 
 import sympy
 from msgspec import structs
@@ -31,6 +32,8 @@ LEFT = "left"
 
 Its symbol in a system is `UNTIL`, so a model can use the name `left` itself.
 """
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,17 @@ class Placement:
     def prefix(self) -> str:
         """Prefix of the names of its parameters and states."""
         return f"{self.port}_{self.name}_"
+
+    def own(self, values: Mapping[str, T]) -> dict[str, T]:
+        """What belongs to its parameters, by their own names.
+
+        The name of an effect may begin with that of another, as `coulomb_by_direction` does.
+
+        Args:
+            values: by the system's names; those of other effects are left out.
+        """
+        named = {name: self.prefix + name for name in self.effect.parameters}
+        return {name: values[whole] for name, whole in named.items() if whole in values}
 
     def __str__(self) -> str:
         return f"effect {self.name} at {self.port}"

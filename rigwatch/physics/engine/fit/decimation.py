@@ -16,6 +16,8 @@ from rigwatch.wire.errors import ModelError
 
 PASSED = 0.8
 """Share of its new band that decimation passes."""
+PADDED = 27
+"""Samples by which a recording is continued at both ends before it is low-passed twice."""
 
 
 @dataclass(frozen=True)
@@ -54,10 +56,13 @@ class Thinning:
         return replace(self, parts=(samples,))
 
     def _part(self, part: FloatArray) -> FloatArray:
-        if part.shape[1] < self.factor * (2 * self.edge + 4):
+        least = self.factor * (2 * self.edge + 4)
+        if self.factor > 1:
+            least = max(least, PADDED + 1)
+        if part.shape[1] < least:
             raise ModelError(
-                f"found a recording of {part.shape[1]} samples, expected at least"
-                f" {self.factor * (2 * self.edge + 4)} to thin it by {self.factor}"
+                f"found a recording of {part.shape[1]} samples, expected at least {least} to thin"
+                f" it by {self.factor}"
             )
         if self.high_pass:
             part = scipy.signal.lfilter(*self.high_pass, part, axis=1)

@@ -220,7 +220,13 @@ def _whole_kernel(signal: FloatArray, width: int, cut: Sequence[int]) -> BoolArr
     """Samples with a complete smoothing window, shape (n,)."""
     kernel = np.ones(width)
     there = np.split(np.isfinite(signal).astype(np.float64), cut)
-    return np.concatenate([np.convolve(piece, kernel, "same") > width - 0.5 for piece in there])
+    # Of a part that is shorter than the kernel the convolution is as long as that.
+    return np.concatenate([
+        np.convolve(piece, kernel, "same") > width - 0.5
+        if len(piece) >= width
+        else np.zeros(len(piece), np.bool_)
+        for piece in there
+    ])  # fmt: skip
 
 
 def _settled(samples: int, cut: Sequence[int], settling: int) -> BoolArray:

@@ -1,12 +1,14 @@
 """The noise floor: the smallest error that can be reached, and how it is estimated.
 
-Repeated periods of the excitation are best: their differences are noise. Next best is a healthy
-recording, which also includes model error, and then the noise that the study states. Otherwise the
-quietest band of the residual, assumed to be white noise, gives a lower limit, or what does not
-repeat with an excitation of any period where that is less: missing physics may fill all bands.
+Repeated periods of the excitation are best: their differences are noise, and where a converter's
+step hides them, so is what its rounding makes. Next best is a healthy recording, which also
+includes model error, and then the noise that the study states. Otherwise the quietest band of the
+residual, assumed to be white noise, gives a lower limit, or what does not repeat with an excitation
+of any period where that is less: missing physics may fill all bands.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
@@ -17,8 +19,9 @@ from rigwatch.physics.transfer import period_by_correlation, shortest_period
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.workbench.data.noise.error_spectrum import ErrorSpectrum
 from rigwatch.workbench.data.noise.quietest_band import quietest_band
+from rigwatch.workbench.data.noise.rounding import rounding
 from rigwatch.workbench.data.noise.stated import stated_rms
-from rigwatch.workbench.data.noise.unrepeated import unrepeated
+from rigwatch.workbench.data.noise.unrepeated import counted_samples, unrepeated
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.study import Study
 
@@ -42,6 +45,7 @@ ALLOWED = {
 BY_CHANCE = 0.1
 """Energy above the model's own error, in units of the noise floor, that chance leaves."""
 FEWEST_PERIODS = 3
+"""Periods of one recording; of several, as many differences between periods."""
 REPEATED = 2e-4
 """Mean square difference of an input one period later, relative to its own; rms 1 % of each."""
 _PERIODS: WeakKeyDictionary[Recording, int] = WeakKeyDictionary()
@@ -138,9 +142,9 @@ def from_residual(
     samples = round(period / recording.dt) if period else find_period(recording)
     series = fitted.residuals.reshape(-1, fitted.residuals.shape[-1])
     if samples and (samples % horizon == 0 or len(fitted.residuals) == 1) and samples % factor == 0:
-        count = len(series) // (samples // factor)
-        if count >= FEWEST_PERIODS:
-            return NoiseFloor(_between(series, samples // factor, count), "periods")
+        found = _between(_apart(series, recording), samples // factor)
+        if found is not None:
+            return NoiseFloor(np.maximum(found, rounding(recording)), "periods")
     rate = 1 / (recording.dt * factor)
     top = 0.38 if factor > 1 else recording.passed
     quiet, chances = zip(*(quietest_band([c], rate, top) for c in series.T), strict=True)
@@ -221,15 +225,30 @@ def _allowed(later: FloatArray) -> float:
     return REPEATED * float(np.mean(later**2))
 
 
-def _between(series: FloatArray, samples: int, count: int) -> FloatArray:
-    periods = series[: count * samples].reshape(count, samples, -1)
-    there = np.isfinite(periods)
-    counted = there.sum(axis=0)
-    mean = np.where(there, periods, 0.0).sum(axis=0) / np.maximum(counted, 1)
-    squares = np.where(there, periods - mean, 0.0) ** 2
-    variance = squares.sum(axis=0) / np.maximum(counted - 1, 1)
-    known = counted > 1
-    return np.array([float(np.sqrt(v[k].mean())) for v, k in zip(variance.T, known.T, strict=True)])
+def _apart(series: FloatArray, recording: Recording) -> list[FloatArray]:
+    """Residuals (n, outputs) of each of the concatenated recordings: a period is of one of them."""
+    ends = np.cumsum(counted_samples(recording))
+    return np.split(series, np.minimum(ends[:-1], len(series)))
+
+
+def _between(parts: Sequence[FloatArray], samples: int) -> FloatArray | None:
+    """Noise of each output by what differs between the periods of each recording, (outputs,).
+
+    None if they hold too few periods.
+    """
+    squares, freedom, whole = np.zeros(parts[0].shape[1]), np.zeros(parts[0].shape[1]), 0
+    for part in parts:
+        count = len(part) // samples
+        periods = part[: count * samples].reshape(count, samples, -1)
+        there = np.isfinite(periods)
+        counted = there.sum(axis=0)
+        mean = np.where(there, periods, 0.0).sum(axis=0) / np.maximum(counted, 1)
+        squares += np.sum(np.where(there, periods - mean, 0.0) ** 2, axis=(0, 1))
+        freedom += np.sum(np.maximum(counted - 1, 0), axis=0)
+        whole += max(count - 1, 0)
+    if whole < FEWEST_PERIODS - 1 or not freedom.all():
+        return None
+    return np.asarray(np.sqrt(squares / freedom))
 
 
 def quiet_scale(recording: Recording) -> FloatArray:

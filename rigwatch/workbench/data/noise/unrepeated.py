@@ -41,8 +41,7 @@ def unrepeated(fitted: Fit, recording: Recording) -> tuple[FloatArray, float] | 
     if len(fitted.residuals) != 1:
         return None
     factor = recording.thinning.factor if recording.thinning else 1
-    edge = recording.thinning.edge if recording.thinning else 0
-    lengths = [-(-(own.stop - own.start) // factor) - 2 * edge for own in recording.slices]
+    lengths = counted_samples(recording)
     if sum(lengths) != fitted.residuals.shape[1]:
         return None
     parts = np.split(fitted.residuals[0], np.cumsum(lengths)[:-1])
@@ -56,6 +55,13 @@ def unrepeated(fitted: Fit, recording: Recording) -> tuple[FloatArray, float] | 
         squares += np.sum(np.square(left), axis=0)
         freedom += len(counted) - taken
     return np.sqrt(squares / freedom), 1 + 3 / float(np.sqrt(2 * freedom))
+
+
+def counted_samples(recording: Recording) -> list[int]:
+    """Samples of the residual in each of the concatenated recordings."""
+    factor = recording.thinning.factor if recording.thinning else 1
+    edge = recording.thinning.edge if recording.thinning else 0
+    return [-(-(own.stop - own.start) // factor) - 2 * edge for own in recording.slices]
 
 
 def exact_period(recording: Recording, own: slice) -> float:

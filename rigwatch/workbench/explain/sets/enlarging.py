@@ -29,8 +29,9 @@ from rigwatch.workbench.ranking import (
 
 _ON_PART: WeakKeyDictionary[Fitted, float] = WeakKeyDictionary()
 """Errors of fits on the part of the training; a fit belongs to one study."""
-_SCORED: WeakKeyDictionary[Fitted, list[Ranked]] = WeakKeyDictionary()
-"""Scores of all effects by the fit they were scored along; sets share the fits of their parts."""
+_SCORED: WeakKeyDictionary[Fitted, dict[bool, list[Ranked]]] = WeakKeyDictionary()
+"""Scores of all effects by the fit they were scored along, and by whether the whole library was
+ranked: sets share the fits of their parts, and a second pass those of the first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,15 +123,17 @@ def _enlarged(bench: Bench, larger: Larger) -> Combination | None:
 
 def scored_with(bench: Bench, known: Combination) -> list[Ranked]:
     """All other effects, scored with a set in the model; computed once for each fit."""
-    if known.fitted not in _SCORED:
+    kept = _SCORED.setdefault(known.fitted, {})
+    whole = bench.study.file.whole_library
+    if whole not in kept:
         study, part = with_rows(bench.study, known.rows), _part(bench)
         found = candidates(study, bench.data.train)
         if part is None:
-            _SCORED[known.fitted] = scored(study, bench.data, known.fitted, found)
+            kept[whole] = scored(study, bench.data, known.fitted, found)
         else:
-            _SCORED[known.fitted] = scored(study, part.data, part.of(known.fitted), found)
+            kept[whole] = scored(study, part.data, part.of(known.fitted), found)
     # A fit and its reasons are stored in a row.
-    return [replace(row) for row in _SCORED[known.fitted]]
+    return [replace(row) for row in kept[whole]]
 
 
 def fit_with(
