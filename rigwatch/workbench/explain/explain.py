@@ -14,6 +14,7 @@ from rigwatch.workbench.compare import (
 from rigwatch.workbench.data import predicts_along_motion
 from rigwatch.workbench.explain.adequacy import (
     cannot_tell,
+    closer_base,
     inadequate,
     reversed_channel,
     stopped_by_outliers,
@@ -63,6 +64,8 @@ from rigwatch.workbench.ranking import (
 from rigwatch.workbench.study import Refusals, Study, refusals, told
 
 RARER = "{text}; it was found among {count} rarer effects, as no usual one explains the error"
+OPEN = ("undetermined", "unknown_effect", "model_inadequate")
+"""Verdicts that name no effect, and do not say that none is missing."""
 BY_CHANCE = 0.05
 """Probability below which a rarer effect's score is more than chance."""
 SECOND_PASS = "the effect was found in a second pass"
@@ -104,8 +107,22 @@ def explained(bench: Bench, progress: Progress = no_progress) -> Explained:
         bench: the study, its recordings and the fitted model.
         progress: called with a line of text as each part begins.
     """
-    first = _explained_once(with_adequate_base(bench, progress), progress)
+    adequate = with_adequate_base(bench, progress)
+    first = _explained_once(adequate, progress)
+    if adequate is bench:
+        first = _on_closer_base(first, progress)
     return _with_rarer(first, progress)
+
+
+def _on_closer_base(first: Explained, progress: Progress) -> Explained:
+    """The explanation; on a base closer to the healthy rig if only there it comes to an end."""
+    if first.explanation.verdict not in OPEN:
+        return first
+    closer = closer_base(first.bench, progress)
+    if closer is None:
+        return first
+    second = _explained_once(closer, progress)
+    return first if second.explanation.verdict in OPEN else second
 
 
 def _with_rarer(first: Explained, progress: Progress) -> Explained:

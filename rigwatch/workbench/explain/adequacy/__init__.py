@@ -9,6 +9,7 @@ sign.py          a channel that is counted the other way
 
 from rigwatch.workbench.explain.adequacy.adequate import (
     SHORT,
+    closer_base,
     inadequate,
     stopped_by_outliers,
     uncalibrated,
@@ -29,6 +30,7 @@ from rigwatch.workbench.explain.adequacy.sign import reversed_channel
 __all__ = [
     "SHORT",
     "cannot_tell",
+    "closer_base",
     "ends_of_range",
     "inadequate",
     "reversed_channel",

@@ -30,6 +30,8 @@ ENOUGH = 2.0
 ADVICE = "try another model or other starting values, or record a healthy run that excites it more"
 VARIED = "`rigwatch study base {study} --take enough` searches for better variants of the model"
 
+CLOSE = 1.5
+"""The same above which a better base is looked for where repeated periods show the noise."""
 FEW = 0.005
 """Share of the samples that are few; of white noise they hold 5 % of the energy."""
 HALF = 0.5
@@ -199,7 +201,7 @@ def with_adequate_base(bench: Bench, progress: Progress) -> Bench:
         return bench
     healthy = _on_healthy(bench)
     lacks = _is_inadequate(bench, healthy)
-    if not lacks and not _leaves_more_than_noise(healthy):
+    if not lacks and not _leaves_more_than_noise(healthy, CLOSE):
         return bench
     told = "does not describe the healthy rig" if lacks else "leaves more than the healthy noise"
     progress(f"the model {told}: searching for a better base")
@@ -210,6 +212,29 @@ def with_adequate_base(bench: Bench, progress: Progress) -> Bench:
     if better is None or _is_inadequate(better, _on_healthy(better)):
         return bench
     return better
+
+
+def closer_base(bench: Bench, progress: Progress) -> Bench | None:
+    """The bench on a base that leaves less of the healthy recordings; None if none is found.
+
+    One that leaves little more than their noise may do so with a wrong response to the motion that
+    a wrong response to the drive makes up for. A fault that changes the motion shows it: no effect
+    then explains what it leaves.
+
+    Args:
+        bench: of a study on its own base.
+        progress: called with a line of text as each fit begins.
+    """
+    if not (_may_search(bench) and _leaves_more_than_noise(_on_healthy(bench), AT_NOISE)):
+        return None
+    progress("no effect explains it on this base: searching for one closer to the healthy rig")
+    try:
+        closer = _on_found_base(bench.study, AT_NOISE, progress)
+    except ModelError:
+        return None
+    if closer is None or _is_inadequate(closer, _on_healthy(closer)):
+        return None
+    return closer
 
 
 def _on_found_base(study: Study, enough: float, progress: Progress) -> Bench | None:
@@ -253,9 +278,9 @@ def _may_search(bench: Bench) -> bool:
     )
 
 
-def _leaves_more_than_noise(healthy: _OnHealthy | None) -> bool:
-    """Whether the healthy recording's error is above a noise that its repeated periods show."""
-    return healthy is not None and healthy.noise.method == "periods" and healthy.ratio > AT_NOISE
+def _leaves_more_than_noise(healthy: _OnHealthy | None, least: float) -> bool:
+    """Whether the healthy recording's error is so many times a noise that its periods show."""
+    return healthy is not None and healthy.noise.method == "periods" and healthy.ratio > least
 
 
 def _is_inadequate(bench: Bench, healthy: _OnHealthy | None) -> bool:
