@@ -9,7 +9,7 @@ from monitor.commissioning.equations.fitted_equations import fitted_equations
 from monitor.model import EquationsPlant
 from monitor.observer import equations_of
 from monitor.signals.recordings import recording_of
-from tests.observer.pushed import DAMPER, MODEL, RATE, STIFF, pushed
+from tests.variants.pushed import DAMPER, MODEL, RATE, STIFF, pushed
 
 
 def commissioned(compressed: float, folder: Path) -> EquationsPlant:

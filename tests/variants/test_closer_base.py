@@ -9,7 +9,7 @@ from rigwatch.workbench.compare import Bench, open_bench
 from rigwatch.workbench.explain.adequacy import closer_base
 from rigwatch.workbench.ranking import no_progress
 from rigwatch.workbench.study.study import open_study
-from tests.observer.pushed import MODEL, RATE, SPRING, pushed
+from tests.variants.pushed import MODEL, RATE, SPRING, pushed
 from tests.workbench.machine import recorded, studied
 
 UNITS = {"voltage": "V", "position": "m", "acceleration": "m/s^2"}
