@@ -6,7 +6,7 @@ healthy motion as well. Voltages are held from sample to sample, so that the res
 """
 
 import numpy as np
-from scipy.signal import cont2discrete
+from scipy.signal import cont2discrete, dlsim
 
 from rigwatch.wire.arrays import FloatArray
 
@@ -95,10 +95,7 @@ def pushed(
     )
     b = np.array([[0.0], [0.0], [SLOW * GAIN]])
     step = cont2discrete((a, b, np.eye(3), np.zeros((3, 1))), 1.0 / RATE, "zoh")
-    state, found = np.zeros(3), np.zeros((volts.size, 3))
-    for row, value in enumerate(volts):
-        found[row] = state
-        state = step[0] @ state + step[1][:, 0] * value
+    found = dlsim(step, volts)[1]
     random = np.random.default_rng(seed)
     return {
         "voltage": volts,

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from msgspec.structs import replace
 
+from monitor.commissioning.equations.described import rms
 from monitor.observer import (
     SETTLING,
     SUBSTEPS,
@@ -122,7 +123,7 @@ def fit_healthy(
         {name: values[name] for name in model.parameters},
         max(values[strength], 0.0),
         float(found.rms[0]) / data.noise,
-        _rms(np.concatenate(later)) / data.noise,
+        rms(np.concatenate(later)) / data.noise if any(map(len, later)) else np.nan,
     )
 
 
@@ -135,10 +136,6 @@ def _left_later(found: Fit, recording: Recording, fitted: int, begun: FloatArray
     except ModelError:
         return np.array([np.inf])
     return whole.residuals[0, fitted - recording.thinning.edge :, 0]
-
-
-def _rms(residual: FloatArray) -> float:
-    return float(np.sqrt(np.mean(residual**2))) if len(residual) else np.nan
 
 
 def _balance(model: Model) -> Model:

@@ -205,13 +205,7 @@ def with_adequate_base(bench: Bench, progress: Progress) -> Bench:
         return bench
     told = "does not describe the healthy rig" if lacks else "leaves more than the healthy noise"
     progress(f"the model {told}: searching for a better base")
-    try:
-        better = _on_found_base(bench.study, ENOUGH if lacks else AT_NOISE, progress)
-    except ModelError:
-        return bench
-    if better is None or _is_inadequate(better, _on_healthy(better)):
-        return bench
-    return better
+    return _on_found_base(bench.study, ENOUGH if lacks else AT_NOISE, progress) or bench
 
 
 def closer_base(bench: Bench, progress: Progress) -> Bench | None:
@@ -219,43 +213,43 @@ def closer_base(bench: Bench, progress: Progress) -> Bench | None:
 
     One that leaves little more than their noise may do so with a wrong response to the motion that
     a wrong response to the drive makes up for. A fault that changes the motion shows it: no effect
-    then explains what it leaves.
+    then explains what it leaves. Where it leaves much, `with_adequate_base` has searched.
 
     Args:
         bench: of a study on its own base.
         progress: called with a line of text as each fit begins.
     """
-    if not (_may_search(bench) and _leaves_more_than_noise(_on_healthy(bench), AT_NOISE)):
+    healthy = _on_healthy(bench)
+    searched = _is_inadequate(bench, healthy) or _leaves_more_than_noise(healthy, CLOSE)
+    if searched or not (_may_search(bench) and _leaves_more_than_noise(healthy, AT_NOISE)):
         return None
     progress("no effect explains it on this base: searching for one closer to the healthy rig")
-    try:
-        closer = _on_found_base(bench.study, AT_NOISE, progress)
-    except ModelError:
-        return None
-    if closer is None or _is_inadequate(closer, _on_healthy(closer)):
-        return None
-    return closer
+    return _on_found_base(bench.study, AT_NOISE, progress)
 
 
 def _on_found_base(study: Study, enough: float, progress: Progress) -> Bench | None:
-    """The bench on the best base found; None if that is the study's own.
+    """The bench on the best base found.
+
+    None if that is the study's own, is inadequate, or cannot be fitted.
 
     Args:
         study: the study.
         enough: ratio of the error to its noise at which nothing more is looked for.
         progress: called with a line of text as each fit begins.
-
-    Raises:
-        ModelError: a base cannot be fitted.
     """
-    found = find_base(study, progress, enough=enough)
-    names = found.enough.variants
-    if set(names) == set(study.file.variants):
+    try:
+        found = find_base(study, progress, enough=enough)
+        names = found.enough.variants
+        if set(names) == set(study.file.variants):
+            return None
+        chosen = varied(study, names)
+        file = structs.replace(chosen.file, start=found.start | dict(study.file.start))
+        progress(f"fitting the model with {', '.join(names)}")
+        better = open_bench(replace(chosen, file=file))
+    except ModelError:
         return None
-    chosen = varied(study, names)
-    file = structs.replace(chosen.file, start=found.start | dict(study.file.start))
-    progress(f"fitting the model with {', '.join(names)}")
-    better = open_bench(replace(chosen, file=file))
+    if _is_inadequate(better, _on_healthy(better)):
+        return None
     told = JUDGED_ON.format(names=", ".join(names), study=study.folder)
     return replace(better, data=replace(better.data, remarks=(*better.data.remarks, told)))
 
