@@ -12,13 +12,14 @@ import struct
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import chain
 
 import zstandard
 
 from rigwatch.wire.bus.kept_messages import KeptMessages
+from rigwatch.wire.bus.slabs import Slabs
 from rigwatch.wire.bus.tokens import NamedToken
 from rigwatch.wire.bus.transport import MAX_PAYLOAD, Transport, send
 from rigwatch.wire.messages import ALARMS, TOPICS, Topic, bus_key
@@ -47,16 +48,19 @@ class Pack:
     first: int
     count: int
     size: int
-    data: bytes
+    data: bytes | memoryview
 
     @classmethod
-    def of(cls, messages: Sequence[Numbered]) -> "Pack":
-        """Pack some messages."""
+    def of(cls, messages: Sequence[Numbered], room: Slabs) -> "Pack":
+        """Pack some messages into some room."""
         payloads = [message.payload for message in messages]
         whole = b"".join(_LENGTH.pack(len(payload)) + payload for payload in payloads)
-        # A copy: what zstandard returns keeps the memory of the largest possible result.
-        packed = bytes(memoryview(zstandard.compress(whole, PACK_LEVEL)))
+        packed = room.put(zstandard.compress(whole, PACK_LEVEL))
         return cls(messages[0].seq, len(payloads), sum(map(len, payloads)), packed)
+
+    def copied(self) -> "Pack":
+        """The same messages, whatever becomes of the room."""
+        return replace(self, data=bytes(self.data))
 
     def messages(self, run: int) -> Iterator[Numbered]:
         """The messages, of this run."""
@@ -78,6 +82,7 @@ class MessageRing:
     def __init__(self, run: int, capacity: int = RING_BYTES) -> None:
         self._run, self._capacity = run, capacity
         self._packs: deque[Pack] = deque()
+        self._room = Slabs()
         self._kept: deque[Numbered] = deque()
         self._bytes = 0
         self._next = 0
@@ -91,13 +96,15 @@ class MessageRing:
             self._kept.append(message)
             self._bytes += len(payload)
             if len(self._kept) >= 2 * PACKED:
-                self._packs.append(Pack.of([self._kept.popleft() for _ in range(PACKED)]))
+                older = [self._kept.popleft() for _ in range(PACKED)]
+                self._packs.append(Pack.of(older, self._room))
             self._forget()
             return message
 
     def _forget(self) -> None:
         while self._packs and self._bytes - self._packs[0].size >= self._capacity:
             self._bytes -= self._packs.popleft().size
+            self._room.drop_oldest()
         while not self._packs and self._bytes > self._capacity:
             self._bytes -= len(self._kept.popleft().payload)
 
@@ -106,18 +113,21 @@ class MessageRing:
         if ask.boot != self._run:
             return RingReply(ask.boot, UNKNOWN, ())
         with self._lock:  # for a moment only: it delays publishing
-            packs, kept, newest = tuple(self._packs), tuple(self._kept), self._next - 1
-        found = first_fitting(self._from(ask.first, packs, kept), ask.last, REPLY_BYTES)
+            packs = [pack.messages(self._run) for pack in self._copied(ask.first)]
+            kept, newest = tuple(self._kept), self._next - 1
+        stored = chain(chain.from_iterable(packs), kept)
+        later = (message for message in stored if message.seq >= ask.first)
+        found = first_fitting(later, ask.last, REPLY_BYTES)
         settled = found[-1].seq if found else min(ask.last, newest)
         return RingReply(self._run, settled, found)
 
-    def _from(
-        self, first: int, packs: Iterable[Pack], kept: Iterable[Numbered]
-    ) -> Iterator[Numbered]:
-        """The messages from number `first` on."""
-        later = (pack for pack in packs if pack.first + pack.count > first)
-        unpacked = (message for pack in later for message in pack.messages(self._run))
-        return (message for message in chain(unpacked, kept) if message.seq >= first)
+    def _copied(self, first: int) -> Iterator[Pack]:
+        """The packs that a reply from number `first` on needs."""
+        beside = 0  # of the first one, which may hold earlier messages [bytes]
+        for pack in self._packs:
+            if pack.first + pack.count > first and beside <= REPLY_BYTES:
+                yield pack.copied()
+                beside += pack.size if pack.first >= first else 0
 
 
 class Outlet:

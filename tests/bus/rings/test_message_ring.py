@@ -1,5 +1,8 @@
 """A ring of messages keeps at least its capacity, and gives back what was put in, bit by bit."""
 
+import random
+import threading
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -47,3 +50,25 @@ def test_a_question_is_answered_to_its_last_number_and_for_its_run_only() -> Non
     assert [message.seq for message in reply.blocks] == list(range(PACKED - 2, PACKED + 3))
     assert ring.reply(Ask(RUN + 1, 0, OPEN)).settled == UNKNOWN
     assert ring.reply(Ask(RUN, 9 * PACKED, OPEN)).settled == 5 * PACKED - 1
+
+
+def test_a_reply_is_as_it_was_asked_for_while_the_ring_moves_on() -> None:
+    draw = random.Random(5)
+    ring = MessageRing(RUN, 1 << 18)
+    sent = [draw.randbytes(draw.randrange(200, 800)) for _ in range(60 * PACKED)]
+    stop = threading.Event()
+
+    def move_on() -> None:
+        for payload in sent:
+            ring.add(payload)
+        stop.set()
+
+    sender = threading.Thread(target=move_on)
+    sender.start()
+    asked = 0
+    while not stop.is_set():
+        reply = ring.reply(Ask(RUN, asked, OPEN))
+        assert all(message.payload == sent[message.seq] for message in reply.blocks)
+        asked = max(asked, reply.settled + 1)
+    sender.join()
+    assert asked
