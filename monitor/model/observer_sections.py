@@ -45,7 +45,7 @@ class RemainderSection(Section, frozen=True, kw_only=True):
         Floats,
         Meta(
             description="upper triangle of R, row by row: RᵀR is the inverse of the covariance of "
-            "the weights that count; empty if that is not known"
+            "the weights that count, in that of the noise; empty if that is not known"
         ),
     ] = ()
 

@@ -1,10 +1,11 @@
 """The terms of the remainder, high-passed as the residual is, and how sure their weights are.
 
-    φ(z) of motion and hidden states ─▶ H[φ]          weights ~ N(w, (RᵀR)⁻¹)
+    φ(z) of motion and hidden states ─▶ H[φ]          weights ~ N(w, σ²·(RᵀR)⁻¹)
 
 Friction changes the motion, and with it what the equations mispredict. How, the healthy recordings
 tell in part: of a periodic motion, only sums of terms that it distinguishes. What the weights of
-all others may be is as large as what the equations leave of the healthy rig.
+all others may be is as large as what the equations leave of the healthy rig. σ² is the mean square
+of what equations and remainder leave of it.
 """
 
 # Compiled functions are untyped to mypy.
@@ -25,7 +26,7 @@ from rigwatch.wire.kernel import kernel, part
 REPEATS = 400.0
 """Healthy samples that count as one: their motions repeat, and what the equations leave of them is
 not random."""
-SIZE = 2.0
+SIZE = 4.0
 """Size that a weight may have which the healthy recordings do not determine, in what the equations
 leave of them [rms]: the terms have a standard deviation of about one."""
 DIGITS = 6
@@ -47,8 +48,8 @@ def information_of(phi: FloatArray, residual: FloatArray, left: FloatArray) -> t
         left: the same without the remainder, shape (n,).
     """
     size = max(SIZE**2 * float(np.mean(residual**2)), 1e-24)
-    variance = max(REPEATS * float(np.mean(left**2)), 1e-9 * size)
-    found = phi.T @ phi / variance + np.eye(phi.shape[1]) / size
+    variance = max(float(np.mean(left**2)), 1e-9 * size)
+    found = phi.T @ phi / REPEATS + np.eye(phi.shape[1]) * variance / size
     root = np.linalg.cholesky(found).T[np.triu_indices(len(found))]
     return tuple(float(f"{value:.{DIGITS}g}") for value in root)
 

@@ -66,8 +66,10 @@ def test_what_a_motion_does_not_tell_apart_is_not_known() -> None:
     sum_of_squares = np.array([0.0, 0.0, 1.0, 0.0, 1.0]) / np.sqrt(2.0)
     difference = np.array([0.0, 0.0, 1.0, 0.0, -1.0]) / np.sqrt(2.0)
     unsure, surer = (float(each @ covariance @ each) for each in (sum_of_squares, difference))
-    left = float(np.mean(judged[256:] ** 2))
-    assert unsure == pytest.approx(SIZE**2 * left, rel=0.01)
+    raw = terms(known, np.array(found.centre), np.array(found.scale))
+    left = (judged - lfilter(*FILTERS, raw @ np.array(found.weights)))[256:]
+    share = np.mean(judged[256:] ** 2) / np.mean(left**2)
+    assert unsure == pytest.approx(SIZE**2 * share, rel=0.01)
     assert surer < 0.5 * unsure
 
 

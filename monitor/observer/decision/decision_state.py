@@ -12,10 +12,11 @@ from monitor.observer.missing_force import high_pass
 from rigwatch.wire.arrays import FloatArray
 
 SHORT, MEDIUM, LONG, LASTING = 8, 32, 128, 256
-"""Window lengths [samples]: of jump detection, estimates, naming, and small lasting changes."""
+"""Window lengths [samples]: of jump detection, estimates, naming, and small lasting changes as well
+as the force that is told."""
 RISING = 2
 """Samples after a reversal during which real friction still changes sign."""
-HISTORY = LONG + RISING
+HISTORY = LASTING + RISING
 SUMS = 13
 """Number of sums over a motion that was not recorded, see `window_statistics.add_unrecorded`."""
 WAKE = 256
@@ -127,8 +128,8 @@ class DecisionRules(NamedTuple):
     """Decision thresholds; energies are relative to the healthy variance, see `HealthyLimits`.
 
     `unseen` is what the limits' energies grow by where a healthy rig's are not known, `high_pass`
-    numerator and denominator of that of the judged signals, shape (2, 3), and `information` that of
-    the remainder's weights, shape (terms, terms); (0, 0) if it is not known.
+    numerator and denominator of that of the judged signals, shape (2, 3), and `information` the RᵀR
+    of the remainder's weights, shape (terms, terms); (0, 0) if it is not known.
     """
 
     noise: float

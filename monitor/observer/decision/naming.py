@@ -136,7 +136,7 @@ def _verdict(
     if fits and since < LONG:
         kept.value[1] = acting
     elif fits and (since % SHORT == 0 or kept.value[1] == 0.0):
-        kept.value[1] = force_of_changed_motion(acting, spread, rules, kept)
+        kept.value[1] = force_of_changed_motion(acting, since, rules, kept)
     if count[AGREED] >= LOOKS or before in (FRICTION, STICKING):
         return STICKING if still > STUCK or before == STICKING else FRICTION
     return OTHER if since > rules.patience else UNNAMED

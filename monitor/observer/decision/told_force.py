@@ -12,11 +12,12 @@ from monitor.observer.decision.decision_state import (
     FILLED,
     HEAD,
     HISTORY,
+    LASTING,
     LEVELS,
-    LONG,
     DecisionRules,
     DecisionState,
 )
+from monitor.observer.decision.deviation import healthy_variance, late_variance
 from monitor.observer.decision.window_statistics import slides, slides_on
 from rigwatch.physics.transfer import filter_sample
 from rigwatch.wire.arrays import FloatArray
@@ -66,9 +67,9 @@ def dry_force(
 
 @part(allocates=True)
 def force_of_changed_motion(
-    alone: float, spread: float, rules: DecisionRules, kept: DecisionState
+    alone: float, since: int, rules: DecisionRules, kept: DecisionState
 ) -> float:
-    """The force that is told once friction has acted throughout the longest window [N].
+    """The force that is told once friction has acted throughout a long window [N].
 
     Friction changes the motion, and what the equations mispredict of the change may look like more
     or less friction. It is a sum of the remainder's terms whose weights differ from those of the
@@ -78,7 +79,7 @@ def force_of_changed_motion(
 
     Args:
         alone: force of dry friction alone [N], told where the information is not known.
-        spread: what a healthy rig leaves, as a standard deviation.
+        since: newest samples in which friction acts.
         rules, kept: as in `decide`.
     """
     count = rules.information.shape[0]
@@ -86,8 +87,9 @@ def force_of_changed_motion(
         return alone
     first = LEVELS + rules.growth.size
     matrix, target = np.zeros((count + 1, count + 1)), np.zeros(count + 1)
-    matrix[:count, :count] = rules.information * spread**2
-    for ago in range(1, min(LONG, kept.counts[FILLED]) + 1):
+    noise = 1.0 + late_variance(kept) / healthy_variance(kept, rules)
+    matrix[:count, :count] = rules.information * noise
+    for ago in range(1, min(since, LASTING, kept.counts[FILLED]) + 1):
         if not slides_on(kept, ago):
             continue
         row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
