@@ -75,7 +75,13 @@ parameters.w = { value = 1000.0, unit = "1/s", low = 1.0, high = 1000.0, fixed =
 
 
 def pushed(
-    volts: FloatArray, compressed: float, seed: int, *, spring: float = SPRING, noise: float = 0.02
+    volts: FloatArray,
+    compressed: float,
+    seed: int,
+    *,
+    spring: float = SPRING,
+    damper: float = DAMPER,
+    noise: float = 0.02,
 ) -> dict[str, FloatArray]:
     """The machine's channels under a held voltage.
 
@@ -84,12 +90,13 @@ def pushed(
         compressed: by how much the motion changes the pressure [Pa/m].
         seed: of the sensors' noise.
         spring: [N/m].
+        damper: [N s/m].
         noise: of the accelerometer [m/s^2].
     """
     a = np.array(
         [
             [0.0, 1.0, 0.0],
-            [-spring / MASS, -DAMPER / MASS, AREA / MASS],
+            [-spring / MASS, -damper / MASS, AREA / MASS],
             [0.0, -compressed, -SLOW],
         ]
     )

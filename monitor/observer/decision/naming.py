@@ -66,8 +66,10 @@ OUTDONE, NOISE = 3.0, 0.02
 the drive, and share below which what is left is not told from noise: a saturated drive, a dead band
 and a lost gain leave much of what dry friction alone would explain, at motions in phase with them.
 """
-AT_REST, STUCK = 0.25, 0.5
-"""Share of the time at rest above which it is stiction."""
+AT_REST, STUCK, RESTS = 0.25, 0.5, 0.1
+"""Share of the time at rest above which it is stiction; and above which the motion is unlike any
+healthy one, so that the weights of healthy recordings tell nothing of it.
+"""
 OVER = 256
 """Samples without a departure after which an episode ends."""
 VIOLATED = 16
@@ -133,7 +135,7 @@ def _verdict(
     sticks = since >= LONG // 2 and still > AT_REST and out[DEPARTED, k] > 0.0
     agrees = since >= LEAST_LOOK and ((fits and turns > 0) or sticks)
     count[AGREED] = count[AGREED] + 1 if agrees and count[DISAGREED] == 0 else 0
-    if fits and since < LONG:
+    if fits and (since < LONG or still > RESTS):
         kept.value[1] = acting
     elif fits and (since % SHORT == 0 or kept.value[1] == 0.0):
         kept.value[1] = force_of_changed_motion(acting, since, rules, kept)

@@ -69,6 +69,7 @@ OPEN = ("undetermined", "unknown_effect", "model_inadequate")
 BY_CHANCE = 0.05
 """Probability below which a rarer effect's score is more than chance."""
 SECOND_PASS = "the effect was found in a second pass"
+TWO_BEYOND_BASE = "two effects at once on a base that was searched for are not told from others"
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +123,23 @@ def _on_closer_base(first: Explained, progress: Progress) -> Explained:
     if closer is None:
         return first
     second = _explained_once(closer, progress)
-    return first if second.explanation.verdict in OPEN else second
+    if second.explanation.verdict in OPEN:
+        return first
+    return replace(second, explanation=unless_two(second.explanation))
+
+
+def unless_two(found: Explanation) -> Explanation:
+    """What is named on a base that was searched for; two effects at once are undetermined there.
+
+    Among pairs on many bases one is found that leaves nothing of a change that is neither, as of a
+    lower supply.
+    """
+    if not found.also:
+        return found
+    text = f"{found.text}; {TWO_BEYOND_BASE}"
+    return replace(
+        found, verdict="undetermined", text=text, wrong_probability=None, wrong_at_most=None
+    )
 
 
 def _with_rarer(first: Explained, progress: Progress) -> Explained:
