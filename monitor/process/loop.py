@@ -192,7 +192,7 @@ class MonitorProcess:
     def look_around(self) -> None:
         """Execute commands, check the link, publish the health."""
         now_ns = self._now_ns()
-        for announced in self._operators.execute(self.rig.alarms, now_ns):
+        for announced in self._operators.execute(self.rig.alarms, now_ns, self.reader.position):
             self.say(announced)
         self._change_models()
         for event in self._explainer.results():

@@ -3,8 +3,8 @@
     bus ──▶ Feed (complete and in order) ──▶ Store (segments; waits for the disk) ──▶ session folder
 
 `folders` chooses the folder and finds the sessions of a rig; `positions` stores how far a recording
-has come, for a recorder that is restarted; `retention` removes and thins old recordings, by rules that
-archives have too. `past` closes the gap that a cut link to a remote rig leaves.
+has come, for a recorder that is restarted; `retention` removes and thins old recordings, by rules
+that archives have too. `past` closes the gap that a cut link to a remote rig leaves.
 """
 
 from rigwatch.recorder.folders import last_block, newest, sessions_of

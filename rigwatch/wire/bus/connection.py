@@ -138,7 +138,7 @@ def connect(
     if links:
         megabytes = min(megabytes, links.ring_megabytes)
     ring_bytes = round(megabytes * (1 << 20))
-    return Bus(transport, config.rig.id, process, signer, ring_bytes, config.bus.lease)
+    return Bus(transport, config.rig.id, process, signer, ring_bytes, lease=config.bus.lease)
 
 
 def _client(

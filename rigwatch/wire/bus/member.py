@@ -42,6 +42,7 @@ class Member:
         process: str,
         signer: CommandSigner | None = None,
         ring_bytes: int = RING_BYTES,
+        *,
         lease: float = LEASE,
     ) -> None:
         self.transport = transport

@@ -12,7 +12,15 @@ from typing import TypeVar
 
 from rigwatch.wire.access import CommandSigner
 from rigwatch.wire.bus.bus import Bus
-from rigwatch.wire.bus.transport import LEASE, MAX_PAYLOAD, Answer, Close, Receive, Waiting, answered
+from rigwatch.wire.bus.transport import (
+    LEASE,
+    MAX_PAYLOAD,
+    Answer,
+    Close,
+    Receive,
+    Waiting,
+    answered,
+)
 from rigwatch.wire.messages import bus_key
 
 T = TypeVar("T")

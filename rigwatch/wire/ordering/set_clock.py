@@ -1,7 +1,8 @@
 """By how much the clock of samples was set, told by the clock of their device.
 
-Stamps follow the host's clock, which people and time servers set. The device counts its microseconds
-on, whatever becomes of the host; where the device itself pauses or jumps, its steps are the odd ones.
+Stamps follow the host's clock, which people and time servers set. The device counts on its
+microseconds, whatever becomes of the host; where the device itself pauses or jumps, its steps are
+the odd ones.
 """
 
 import numpy as np
