@@ -80,11 +80,11 @@ class AgeClock:
         if wall_ns < EARLIEST_NS:
             return wall_ns
         steady_ns, last = round(monotonic_s * 1e9), self._last
-        age_ns = (
-            wall_ns if last is None else min(wall_ns, self._latest_ns(last, steady_ns, wall_ns))
-        )
+        if last is None:
+            last = Moment(wall_ns, wall_ns, 0, wall_ns, steady_ns, self._boot)
+        age_ns = min(wall_ns, self._latest_ns(last, steady_ns, wall_ns))
         reached_ns, behind_ns = age_ns, 0
-        if last is not None and last.reached_ns > age_ns:
+        if last.reached_ns > age_ns:
             behind_ns = last.behind_ns + (self._passed_ns(last, steady_ns) or 0)
             # A clock that was set back and stays there is right: ahead is wrong again.
             reached_ns = age_ns if behind_ns > self._longest_stop_ns else last.reached_ns

@@ -22,7 +22,7 @@ from rigwatch.wire.ordering.past_runs import PastRun, PastRuns, first_fitting
 from rigwatch.wire.ordering.ring_protocol import EMPTY, OPEN, UNKNOWN, Ask, RingReply
 from rigwatch.wire.ordering.sample_order import LARGEST_SEQ, SampleOrder
 from rigwatch.wire.ordering.sender_rates import SenderRates
-from rigwatch.wire.ordering.set_clock import set_by_ns
+from rigwatch.wire.ordering.set_clock import elapsed_ns, set_by_ns
 
 __all__ = [
     "EMPTY",
@@ -43,6 +43,7 @@ __all__ = [
     "RingReply",
     "SampleOrder",
     "SenderRates",
+    "elapsed_ns",
     "first_fitting",
     "set_by_ns",
 ]
