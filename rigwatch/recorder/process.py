@@ -165,6 +165,8 @@ class Recorder:
             "dropped_messages": float(self.store.dropped_messages + self.feed.dropped),
             "rejected": float(self.feed.rejected),
             "refused_messages": float(self.feed.refused),
+            "foreign_samples": float(self.feed.foreign_samples),
+            "foreign_messages": float(self.feed.foreign),
             "foreign_gaps": float(self.feed.foreign_gaps),
             "segments": float(self.store.segment_count),
             "free_share": -1.0 if math.isnan(share) else share,

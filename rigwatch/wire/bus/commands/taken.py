@@ -11,7 +11,7 @@ from rigwatch.wire.bus.commands.command_check import command_mark
 from rigwatch.wire.messages import AlarmCommand, Event
 
 TAKEN = "alarm_command_taken"
-_PLACE = re.compile(r" after sample (\d+) of boot (\d+) \[(command [0-9a-f]{16})\]$")
+_PLACE = re.compile(r" after sample (-?\d+) of boot (\d+) \[(command [0-9a-f]{16})\]$")
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +20,7 @@ class TakenAt:
 
     Attributes:
         mark: identifies the command, see `command_mark`.
-        boot, seq: the last sample before it.
+        boot, seq: the last sample before it; number -1 before the boot's first.
         t_ns: the time at which it took effect [ns].
     """
 
