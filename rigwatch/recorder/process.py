@@ -25,7 +25,7 @@ from rigwatch.recorder.past import PastServer
 from rigwatch.recorder.positions import PositionFile, Positions
 from rigwatch.recorder.remote_feed import RemoteFeed
 from rigwatch.recorder.resuming import of_living
-from rigwatch.recorder.retention import Retention, Thinning, clock_of
+from rigwatch.recorder.retention import DAY, Retention, Thinning, clock_of
 from rigwatch.recorder.session_length import SessionLength
 from rigwatch.recorder.store import Store
 from rigwatch.wire.bus import Bus, joined
@@ -169,6 +169,7 @@ class Recorder:
             "foreign_messages": float(self.feed.foreign),
             "foreign_gaps": float(self.feed.foreign_gaps),
             "segments": float(self.store.segment_count),
+            "ages_behind_days": self._ages.lag_s / DAY,
             "free_share": -1.0 if math.isnan(share) else share,
             "disk_trouble": float(bool(self.store.failure) or self._disk.short),
         }

@@ -60,6 +60,9 @@ class AgeClock:
         newest_ns: when the newest recording was written, which counts without a note; None if there
             is no recording [ns].
         boot: name of the machine's present run.
+
+    Attributes:
+        lag_s: by how much this time was behind the wall clock at the last call [s].
     """
 
     def __init__(
@@ -74,6 +77,7 @@ class AgeClock:
         self._boot = boot
         self._last = _noted(self._note) or _written(newest_ns)
         self._noted_s: float | None = None
+        self.lag_s = 0.0
 
     def now_ns(self, monotonic_s: float, wall_ns: int) -> int:
         """This time at a moment [ns], given as monotonic time [s] and Unix time [ns]."""
@@ -89,6 +93,7 @@ class AgeClock:
             # A clock that was set back and stays there is right: ahead is wrong again.
             reached_ns = age_ns if behind_ns > self._longest_stop_ns else last.reached_ns
         self._last = Moment(age_ns, reached_ns, behind_ns, wall_ns, steady_ns, self._boot)
+        self.lag_s = (wall_ns - age_ns) / 1e9
         if self._noted_s is None or monotonic_s - self._noted_s >= NOTED_EVERY:
             self._noted_s = monotonic_s
             self.note()

@@ -166,6 +166,7 @@ def test_a_clock_that_stays_ahead_is_followed_at_twice_the_speed(tmp_path: Path)
     assert clock.now_ns(0.0, BEGIN) == BEGIN
     ahead = BEGIN + 10**13
     assert clock.now_ns(100.0, ahead) == BEGIN + 200 * 10**9
+    assert clock.lag_s == pytest.approx(9_800.0)
     assert clock.now_ns(5_100.0, ahead + 10**13) == BEGIN + 10_200 * 10**9
     assert clock.now_ns(30_000.0, ahead + 3 * 10**13) == BEGIN + 4 * 10**13
     assert clock.now_ns(30_001.0, BEGIN) == BEGIN, "back at once"
