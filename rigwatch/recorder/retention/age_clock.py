@@ -8,8 +8,9 @@ while a recorder runs nor when it starts:
     the machine was off                nobody knows for how long: as the clock says, but no longer
                                        than half of what is kept
 
-So a recording stays for half of its time at least, whatever the clock says. A clock that is set
-back is followed at once, and again ahead to where it was.
+So no one wrong start, nor a clock that is wrong while time passes, ends a recording that is younger
+than half of its time. A clock that is set back is followed at once, and again ahead to where it
+was.
 """
 
 import contextlib
