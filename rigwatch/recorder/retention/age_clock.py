@@ -57,7 +57,8 @@ class AgeClock:
 
     Args:
         settings: section [recorder], which says how long recordings are kept.
-        note: file in which this time is noted for the next start; None for no note.
+        note: file in which this time is noted for the next start; None for no note. Where nothing
+            is limited by its age, nothing is noted.
         newest_ns: when the newest recording was written, which counts without a note; None if there
             is no recording [ns].
         boot: name of the machine's present run.
@@ -74,7 +75,7 @@ class AgeClock:
         boot: str = "",
     ) -> None:
         self._longest_stop_ns = _least_kept_ns(settings) // 2
-        self._note = note if self._longest_stop_ns else None
+        self._note = note
         self._boot = boot
         self._last = _noted(self._note) or _written(newest_ns)
         self._noted_s: float | None = None
@@ -82,7 +83,7 @@ class AgeClock:
 
     def now_ns(self, monotonic_s: float, wall_ns: int) -> int:
         """This time at a moment [ns], given as monotonic time [s] and Unix time [ns]."""
-        if wall_ns < EARLIEST_NS:
+        if wall_ns < EARLIEST_NS or not self._longest_stop_ns:
             return wall_ns
         steady_ns, last = round(monotonic_s * 1e9), self._last
         if last is None:
@@ -102,7 +103,7 @@ class AgeClock:
 
     def note(self) -> None:
         """Note the present time; without it, as on a full disk, the earlier one counts."""
-        if self._note is not None and self._last is not None:
+        if self._note is not None and self._noted_s is not None:
             with contextlib.suppress(OSError):
                 replace_file(self._note, msgspec.json.encode(self._last), durable=False)
 

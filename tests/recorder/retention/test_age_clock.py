@@ -209,8 +209,9 @@ def test_the_time_is_noted_once_a_minute_and_only_where_something_is_kept(tmp_pa
         written.append(note.read_text())
     assert len(set(written)) == 3
     note.unlink()
-    forever = clock_of(RecorderSection(folder=str(tmp_path)), "bench", None)
-    forever.now_ns(0.0, BEGIN)
+    forever = clock_of(RecorderSection(folder=str(tmp_path)), "bench", BEGIN)
+    assert forever.now_ns(0.0, BEGIN + DAY_NS) == BEGIN + DAY_NS
+    forever.note()
     assert not note.exists()
 
 
