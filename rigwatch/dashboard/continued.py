@@ -9,12 +9,9 @@ came before it. From the step on, all times are later by as much as the clock wa
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 from rigwatch.dashboard.board import SET_BACK_NS
 from rigwatch.wire.messages import EstimateBlock, Message, SampleBlock
-
-B = TypeVar("B", SampleBlock, EstimateBlock)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +84,7 @@ class Continued:
         times = [message.t_ns + self._by_ns(number) for number in passed]
         return replace(message, t_ns=min(times, key=lambda t_ns: abs(t_ns - self._newest_ns)))
 
-    def _block(self, block: B) -> B:
+    def _block(self, block: SampleBlock | EstimateBlock) -> Message:
         self._follow(block)
         t_ns = block.t_ns + self._by_ns(self._passed)
         self._newest_ns = int(t_ns[-1])

@@ -104,10 +104,10 @@ def _placed(order: Order, places: dict[str, TakenAt]) -> Placed:
 def _executed(recorded: list[Message], events: list[Event]) -> list[Order]:
     """From the last, those that the monitor did not refuse; of equal ones it executed the first."""
     refused = Counter(
-        mark[1]
+        found[1]
         for event in events
         if event.code == "alarm_command_refused" and event.source == "monitor/alarms"
-        if (mark := _MARK.search(event.text))
+        if (found := _MARK.search(event.text))
     )
     kept = []
     for order in reversed([one for one in recorded if isinstance(one, Order)]):
