@@ -6,6 +6,7 @@ but oversized messages, and the processes themselves have to drop what is not th
 
 import contextlib
 import json
+import random
 import socket
 import subprocess
 import threading
@@ -105,6 +106,7 @@ class Attacked:
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
         self.outcome = Outcome()
         self.newest: Counter[str] = Counter()
+        self._chance = random.Random(3)
 
     def start(self) -> None:
         """Start all processes and wait for estimates."""
@@ -167,11 +169,11 @@ class Attacked:
             self.outcome.wrong += not same
 
     def attack(self, messages: Iterable[tuple[str, str, bytes]], until: float) -> None:
-        """Send messages from all clients in turn, until all are sent or it is `until` [s]."""
-        for number, (how, key, payload) in enumerate(messages):
+        """Send messages, each from a client that is drawn, until all are sent or `until` [s]."""
+        for how, key, payload in messages:
             if time.monotonic() > until:
                 return
-            client = self.clients[number % len(self.clients)]
+            client = self._chance.choice(self.clients)
             _send(client, how, key, payload)
             fate = self._fate(client, how, key, payload)
             self.outcome.sent[fate] += len_of_samples(payload) if fate == "samples" else 1
