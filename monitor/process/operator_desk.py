@@ -36,7 +36,7 @@ class OperatorDesk:
         return {"commands_refused": float(self._check.refused), "commands_lost": float(lost)}
 
     def execute(
-        self, alarms: AlarmManager, now_ns: int, position: tuple[int, int] | None
+        self, alarms: AlarmManager, now_ns: int, position: tuple[int, int] | None = None
     ) -> Iterator[list[Announcement]]:
         """Execute waiting commands; what to publish for each.
 
