@@ -41,6 +41,13 @@ class RemainderSection(Section, frozen=True, kw_only=True):
     centre: Annotated[Floats, Meta(description="mean of each signal")]
     scale: Annotated[Floats, Meta(description="standard deviation of each signal")]
     weights: Annotated[Floats, Meta(description="of each signal, then of each product of two")]
+    information: Annotated[
+        Floats,
+        Meta(
+            description="upper triangle of R, row by row: RᵀR is the inverse of the covariance of "
+            "the weights that count, in that of the noise; empty if that is not known"
+        ),
+    ] = ()
 
 
 class RangeSection(Section, frozen=True, kw_only=True):

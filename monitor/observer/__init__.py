@@ -57,6 +57,7 @@ from monitor.observer.prediction import (
 )
 from monitor.observer.range_seen import RangeSeen, drive_energy, range_of, range_signals
 from monitor.observer.remainder import fit_remainder, no_remainder
+from monitor.observer.remainder_terms import RemainderTerms, information_matrix
 from monitor.observer.spectral_width import SpectralWidth, Spectrum
 from monitor.observer.usual_error import Extremes, UsualError, steady_motion
 
@@ -87,6 +88,7 @@ __all__ = [
     "Observed",
     "ObserverSignals",
     "RangeSeen",
+    "RemainderTerms",
     "SpectralWidth",
     "Spectrum",
     "UsualError",
@@ -103,6 +105,7 @@ __all__ = [
     "friction_at",
     "friction_limit",
     "high_pass",
+    "information_matrix",
     "layout_of",
     "levels",
     "motion_kernel",

@@ -126,7 +126,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
         if state[k] == EMPTY:
             continue
         if state[k] == FIRST:
-            _at_rest(columns[k], kept, b)
+            at_rest(columns[k], kept, b)
         remainder = _remainder(z[k], known, scaled)
         for c in range(columns.shape[1]):
             value = columns[k, c]
@@ -155,7 +155,7 @@ def _remainder(z: FloatArray, known: Polynomial, scaled: FloatArray) -> float:
 
 
 @part()
-def _at_rest(row: FloatArray, kept: FloatArray, b: FloatArray) -> None:
+def at_rest(row: FloatArray, kept: FloatArray, b: FloatArray) -> None:
     """Steady state of a high-pass for a constant row, in transposed direct form II."""
     for c in range(kept.shape[0]):
         kept[c, 0] = -b[0] * row[c]

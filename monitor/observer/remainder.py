@@ -13,7 +13,8 @@ import scipy
 
 from monitor.model import RemainderSection
 from monitor.observer.missing_force import terms
-from rigwatch.wire.arrays import BoolArray, FloatArray
+from monitor.observer.remainder_terms import counting_terms, information_of
+from rigwatch.wire.arrays import FloatArray
 
 RIDGE = 3e-3
 """Ridge weight of the coefficients relative to the error, both in standard deviations."""
@@ -41,23 +42,20 @@ def fit_remainder(
     """
     every = np.concatenate([signals[skip:] for signals, _ in parts])
     centre, scale = every.mean(axis=0), np.maximum(every.std(axis=0), 1e-12)
-    used = _used(every.shape[1], without)
+    used = counting_terms(every.shape[1], without)
     columns = [
         scipy.signal.lfilter(*filters, terms(z, centre, scale)[:, used], axis=0)[skip:]
         for z, _ in parts
     ]
-    phi, left = np.concatenate(columns), np.concatenate([e[skip:] for _, e in parts])
+    phi, residual = np.concatenate(columns), np.concatenate([e[skip:] for _, e in parts])
     size = np.maximum(phi.std(axis=0), 1e-12)
-    phi = phi / size
-    gram = phi.T @ phi + RIDGE * len(phi) * np.eye(phi.shape[1])
+    alike = phi / size
+    gram = alike.T @ alike + RIDGE * len(phi) * np.eye(phi.shape[1])
     weights = np.zeros(used.size)
-    weights[used] = np.linalg.solve(gram, phi.T @ left) / size
+    weights[used] = np.linalg.solve(gram, alike.T @ residual) / size
     return RemainderSection(
-        centre=tuple(centre.tolist()), scale=tuple(scale.tolist()), weights=tuple(weights.tolist())
+        centre=tuple(centre.tolist()),
+        scale=tuple(scale.tolist()),
+        weights=tuple(weights.tolist()),
+        information=information_of(phi, residual, residual - phi @ weights[used]),
     )
-
-
-def _used(signals: int, without: Collection[int]) -> BoolArray:
-    """Whether each term is one of the signals that count, shape (terms,)."""
-    counts = ~np.isin(np.arange(signals), list(without))
-    return np.concatenate([counts, np.outer(counts, counts)[np.triu_indices(signals)]])

@@ -24,12 +24,15 @@ from monitor.observer import (
     Observed,
     ObserverSignals,
     RangeSeen,
+    RemainderTerms,
     UsualError,
     decide,
     drive_energy,
     equations_of,
     friction_limit,
+    information_matrix,
     levels,
+    remainder_signals,
 )
 from monitor.observer import decision_state as d
 from monitor.pipeline.promoted import check_can_follow
@@ -81,8 +84,9 @@ class ObserverMonitor:
         self._follow(model)
 
     def _follow(self, model: RigModel) -> None:
-        plant = model.plant
+        plant, remainder = model.plant, model.remainder
         assert isinstance(plant, EquationsPlant)
+        assert remainder is not None
         assert model.healthy is not None
         assert model.motion_range is not None
         layout = self._signals.layout
@@ -90,11 +94,17 @@ class ObserverMonitor:
         self._range = RangeSeen(model, layout.speed)
         self._jumps = ChannelJumps(model.motion_range, self._equations, layout.channels)
         self._edges = [BridgedEdges() for _ in range(layout.motions[0])]
-        self._state = d.new_state(1 + 2 * len(layout.motions))
+        information = information_matrix(remainder, layout.sensed)
+        self._terms = (
+            RemainderTerms(remainder, layout.sensed, plant.corner, model.sample_rate)
+            if information.size
+            else None
+        )
+        self._state = d.new_state(1 + 2 * len(layout.motions), len(information))
         self._since = 0
         self._recorded = RecordedDrives(model.healthy.steady_drive_energies)
         self._usual = UsualError(model.healthy, model.sample_rate)
-        self.rules = d.rules_of(model.healthy, model.sample_rate, plant.corner)
+        self.rules = d.rules_of(model.healthy, model.sample_rate, plant.corner, information)
         self._clipping = Clipping(model)
 
     def update(self, block: SampleBlock) -> Result | None:
@@ -111,6 +121,9 @@ class ObserverMonitor:
         layout, remainder = self._signals.layout, self.model.remainder
         assert remainder is not None
         grown = levels(seen.rows[:, list(layout.motions)], seen.judged[:, PREDICTED], remainder)
+        if self._terms is not None:
+            z = remainder_signals(seen.rows, seen.predicted.hidden, layout)
+            grown = np.ascontiguousarray(np.hstack([grown, self._terms.update(z, seen.state)]))
         speed = np.ascontiguousarray(seen.rows[:, layout.speed])
         inside = (far <= 1.0) | self._recorded.contain(seen.bands)
         known = self.model.motion_range

@@ -76,7 +76,7 @@ class BusSection(Section, frozen=True):
         Meta(
             gt=0,
             description="memory of each numbered topic for messages that readers may have missed "
-            "[MB]",
+            "[MB]; of alarms and model changes at most 2",
         ),
     ] = 32.0
     security: Annotated[SecuritySection, Meta(description="access to the bus")] = field(

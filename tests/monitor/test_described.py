@@ -51,6 +51,19 @@ def test_fast_motion_that_is_not_described_is_left_out() -> None:
     assert found.share == pytest.approx(0.039, rel=0.05)
 
 
+def test_of_a_sweep_that_becomes_slow_late_only_the_slow_end_is_judged() -> None:
+    one = sweep(0.9, above=4.0)
+    down = replace(one, judged=one.judged[::-1].copy(), pace=one.pace[::-1].copy())
+
+    found = described([down, tone(4.0)], "rig", RATE)
+
+    assert 4.0 <= found.fastest < 5.0
+    begin, end = found.parts[0]
+    assert begin > down.held_out
+    assert end == N
+    assert found.share < 0.1
+
+
 def test_noise_at_the_slow_end_of_a_sweep_does_not_count() -> None:
     one = sweep(0.4)
     one.judged[: N // 10, E] = 0.5 * one.judged[: N // 10, MEASURED]

@@ -119,14 +119,20 @@ def described(recordings: Sequence[Left], model: str, rate: float) -> Described:
             f" of a healthy recording, expected at most {100 * WORST:.0f} %: the model cannot judge"
             " this rig; try another model, or check that the recording is healthy"
         )
-    errors = np.concatenate([one.judged[one.held_out : part[1], E] for one, part in kept])
+    errors = np.concatenate([one.judged[_held_out(one, part) : part[1], E] for one, part in kept])
     return Described(parts, fastest, left, rms(errors))
 
 
 def _left_of(one: Left, part: tuple[int, int], rate: float) -> float:
     """Relative residual of what is kept: of its held-out samples or, without any, of all."""
-    begin = one.held_out if one.held_out < part[1] else max(part[0], round(STARTED * rate))
+    held_out = _held_out(one, part)
+    begin = held_out if held_out < part[1] else max(part[0], round(STARTED * rate))
     return one.share(begin, part[1])
+
+
+def _held_out(one: Left, part: tuple[int, int]) -> int:
+    """First sample of what is kept of a recording that the remainder was not fitted to."""
+    return max(one.held_out, part[0])
 
 
 def _fastest(recordings: Sequence[Left], rate: float) -> float:

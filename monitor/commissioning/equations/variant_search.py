@@ -78,4 +78,7 @@ def _best_of(
     if not made:
         return None
     names, brief = min(made, key=lambda each: each[1].error)
-    return names, fit_healthy(brief.model, data, brief.values)
+    try:
+        return names, fit_healthy(brief.model, data, brief.values)
+    except ModelError:
+        return None

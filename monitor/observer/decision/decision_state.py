@@ -12,10 +12,11 @@ from monitor.observer.missing_force import high_pass
 from rigwatch.wire.arrays import FloatArray
 
 SHORT, MEDIUM, LONG, LASTING = 8, 32, 128, 256
-"""Window lengths [samples]: of jump detection, estimates, naming, and small lasting changes."""
+"""Window lengths [samples]: of jump detection, estimates, naming, and small lasting changes as well
+as the force that is told."""
 RISING = 2
 """Samples after a reversal during which real friction still changes sign."""
-HISTORY = LONG + RISING
+HISTORY = LASTING + RISING
 SUMS = 13
 """Number of sums over a motion that was not recorded, see `window_statistics.add_unrecorded`."""
 WAKE = 256
@@ -44,7 +45,8 @@ USUAL_LASTING, USUAL_SHORT, USUAL_MEDIUM, USUAL_FRICTION, USUAL_ONSET = range(5)
     ERROR, DRY, WET, LEVEL, DISAGREE, MEASURED, DRIVEN, DELAYED, READ, UNDECIDED, SPEED,
     BARE, LEVELS,
 ) = range(13)  # fmt: skip
-"""Columns of the history; from `LEVELS` on, the levels on which the healthy variance depends."""
+"""Columns of the history; from `LEVELS` on, the levels on which the healthy variance depends, and
+behind them the remainder's terms."""
 
 
 class Counts(NamedTuple):
@@ -80,7 +82,7 @@ class DecisionState(NamedTuple):
     """Carried state.
 
     Args:
-        rows: the last samples, shape (HISTORY, LEVELS + levels).
+        rows: the last samples, shape (HISTORY, LEVELS + levels + terms of the remainder).
         counts: see `Counts`; since_onset is -1 without an episode.
         value: verdict, named force, and energies of the drive recently and before.
         lasting: the last judged energies, relative to their limit, shape (LASTING,).
@@ -100,16 +102,17 @@ class DecisionState(NamedTuple):
     instants: FloatArray
 
 
-def new_state(levels: int) -> DecisionState:
+def new_state(levels: int, terms: int = 0) -> DecisionState:
     """The initial state.
 
     Args:
         levels: number of levels on which the healthy variance depends.
+        terms: number of the remainder's terms of which the information is known.
     """
     count = np.zeros(len(AT), np.int64)
     count[AT.since_onset] = -1
     count[AT.since_jump] = WAKE
-    rows = np.zeros((HISTORY, LEVELS + levels))
+    rows = np.zeros((HISTORY, LEVELS + levels + terms))
     lasting, sums = np.zeros(LASTING), np.zeros(SUMS)
     inputs = no_lateness(), no_edges(), no_instants()
     return DecisionState(rows, count, np.zeros(4), lasting, sums, *inputs)
@@ -117,13 +120,16 @@ def new_state(levels: int) -> DecisionState:
 
 PASSED = np.array([[1.0, 0.0, 0.0]] * 2)
 """The high-pass of signals that are judged as they are."""
+NOT_KNOWN = np.zeros((0, 0))
+"""The information of a remainder whose weights may be known or not."""
 
 
 class DecisionRules(NamedTuple):
     """Decision thresholds; energies are relative to the healthy variance, see `HealthyLimits`.
 
     `unseen` is what the limits' energies grow by where a healthy rig's are not known, `high_pass`
-    numerator and denominator of that of the judged signals, shape (2, 3).
+    numerator and denominator of that of the judged signals, shape (2, 3), and `information` the RᵀR
+    of the remainder's weights, shape (terms, terms); (0, 0) if it is not known.
     """
 
     noise: float
@@ -140,14 +146,24 @@ class DecisionRules(NamedTuple):
     lasting: float
     unseen: float = 1.0
     high_pass: FloatArray = PASSED
+    information: FloatArray = NOT_KNOWN
 
 
 MARGIN = 1.6
 """Amplitude ratio of a threshold to the largest value of healthy recordings."""
 
 
-def rules_of(limits: HealthyLimits, rate: float, corner: float) -> DecisionRules:
-    """Rules for a rate [Hz], and the corner [Hz] above which signals are judged."""
+def rules_of(
+    limits: HealthyLimits, rate: float, corner: float, information: FloatArray
+) -> DecisionRules:
+    """Rules of a rig.
+
+    Args:
+        limits: of the healthy rig.
+        rate: sample rate [Hz].
+        corner: above which signals are judged [Hz].
+        information: of the remainder's weights, see `DecisionRules`.
+    """
     energy = MARGIN**2
     return DecisionRules(
         limits.noise,
@@ -164,6 +180,7 @@ def rules_of(limits: HealthyLimits, rate: float, corner: float) -> DecisionRules
         energy,
         max(limits.unseen**2 / energy, 1.0),
         np.array(high_pass(corner, rate)),
+        information,
     )
 
 

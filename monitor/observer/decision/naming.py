@@ -133,10 +133,10 @@ def _verdict(
     sticks = since >= LONG // 2 and still > AT_REST and out[DEPARTED, k] > 0.0
     agrees = since >= LEAST_LOOK and ((fits and turns > 0) or sticks)
     count[AGREED] = count[AGREED] + 1 if agrees and count[DISAGREED] == 0 else 0
-    if fits:
+    if fits and since < LONG:
         kept.value[1] = acting
-        if since >= LONG:
-            kept.value[1] = force_of_changed_motion(acting, spread, turns, kept)
+    elif fits and (since % SHORT == 0 or kept.value[1] == 0.0):
+        kept.value[1] = force_of_changed_motion(acting, since, rules, kept)
     if count[AGREED] >= LOOKS or before in (FRICTION, STICKING):
         return STICKING if still > STUCK or before == STICKING else FRICTION
     return OTHER if since > rules.patience else UNNAMED

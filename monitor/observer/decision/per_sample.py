@@ -82,7 +82,11 @@ def decide(  # noqa: PLR0917 -- a kernel
     kept: DecisionState,
     out: FloatArray,
 ) -> None:
-    """Fill the columns of `OUTPUTS`, shape (outputs, n), sample by sample."""
+    """Fill the columns of `OUTPUTS`, shape (outputs, n), sample by sample.
+
+    `levels` holds those on which the healthy variance depends and, behind them, the terms of the
+    remainder if the rules have the information of their weights.
+    """
     for k in range(state.size):
         if state[k] == EMPTY:
             continue

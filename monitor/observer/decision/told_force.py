@@ -12,28 +12,19 @@ from monitor.observer.decision.decision_state import (
     FILLED,
     HEAD,
     HISTORY,
-    LEVEL,
-    LONG,
-    WET,
+    LASTING,
+    LEVELS,
+    DecisionRules,
     DecisionState,
 )
-from monitor.observer.decision.deviation import late_variance
-from monitor.observer.decision.window_statistics import (
-    RIDGE,
-    slides,
-    slides_on,
-    solved,
-)
+from monitor.observer.decision.deviation import healthy_variance, late_variance
+from monitor.observer.decision.window_statistics import slides, slides_on
 from rigwatch.physics.transfer import filter_sample
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import part
 
-PUSHES = 2.0
-"""Standard deviations by which dry friction beside what is mispredicted of the changed motion
-exceeds dry friction alone, above which the latter acts as negative damping.
-"""
-OFTEN = 3
-"""Reversals in the longest window that tell dry friction from what is mispredicted."""
+SINGULAR = 1e-9
+"""Share of a pivot that must be left for its unknown to be determined."""
 
 
 @part()
@@ -74,66 +65,68 @@ def dry_force(
     return whole, acting
 
 
-@part()
-def force_of_changed_motion(alone: float, spread: float, turns: int, kept: DecisionState) -> float:
-    """The force that is told once friction has acted throughout the longest window [N].
+@part(allocates=True)
+def force_of_changed_motion(
+    alone: float, since: int, rules: DecisionRules, kept: DecisionState
+) -> float:
+    """The force that is told once friction has acted throughout a long window [N].
 
-    Friction changes the motion, and what the equations mispredict of the change is like damping, of
-    either sign, and like mass. Negative damping, which no friction is, makes dry friction alone
-    appear smaller: then the force beside both is told. Positive damping may as well be what
-    smoothing and presliding round off. Only reversals tell dry friction from either. What is not
-    known of the inputs' lateness repeats with the motion, and at worst all of it looks like the
-    difference.
+    Friction changes the motion, and what the equations mispredict of the change may look like more
+    or less friction. It is a sum of the remainder's terms whose weights differ from those of the
+    healthy rig by no more than its recordings leave open: the force is that of dry friction beside
+    them, the mean of its distribution given the residual (Bayesian linear regression, C. Bishop,
+    Pattern Recognition and Machine Learning, 2006, section 3.3).
 
     Args:
-        alone: force of dry friction alone [N].
-        spread: what a healthy rig leaves, as a standard deviation.
-        turns: reversals in the longest window.
-        kept: the state.
+        alone: force of dry friction alone [N], told where the information is not known.
+        since: newest samples in which friction acts.
+        rules, kept: as in `decide`.
     """
-    if turns < OFTEN:
+    count = rules.information.shape[0]
+    if count == 0:
         return alone
-    beside, left, used = _beside_change(kept, LONG)
-    unsure = PUSHES * spread + np.sqrt(used * late_variance(kept))
-    return beside if (beside - alone) * np.sqrt(left) > unsure else alone
-
-
-@part()
-def _beside_change(kept: DecisionState, length: int) -> tuple[float, float, int]:
-    """Force of dry friction beside what is mispredicted of the motion that it has changed [N], what
-    determines it, and the number of samples that count.
-
-    To first order that is a combination of viscous friction and of the predicted acceleration, as
-    friction mostly changes size and phase of the motion.
-
-    Args:
-        kept: the window's rows.
-        length: of the window [samples].
-    """
-    used = 0
-    a = b = c = p = q = d = f = h = r = yy = 0.0
-    for ago in range(1, min(length, kept.counts[FILLED]) + 1):
+    first = LEVELS + rules.growth.size
+    matrix, target = np.zeros((count + 1, count + 1)), np.zeros(count + 1)
+    noise = 1.0 + late_variance(kept) / healthy_variance(kept, rules)
+    matrix[:count, :count] = rules.information * noise
+    for ago in range(1, min(since, LASTING, kept.counts[FILLED]) + 1):
         if not slides_on(kept, ago):
             continue
         row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
-        dry, wet, moved, error = row[DRY], row[WET], row[LEVEL], row[ERROR]
-        used += 1
-        a += dry * dry
-        b += dry * wet
-        c += wet * wet
-        p += dry * error
-        q += wet * error
-        d += dry * moved
-        f += wet * moved
-        h += moved * moved
-        r += moved * error
-        yy += error * error
-    if h <= 0.0:
-        return 0.0, 0.0, 0
-    h *= 1.0 + RIDGE
-    products = a - d * d / h, b - d * f / h, c - f * f / h
-    force, _, left, _, _ = solved(*products, p - d * r / h, q - f * r / h, yy, 0.0)
-    return force, left, used
+        for i in range(count):
+            for j in range(i + 1):
+                matrix[i, j] += row[first + i] * row[first + j]
+            matrix[count, i] += row[DRY] * row[first + i]
+            target[i] += row[first + i] * row[ERROR]
+        matrix[count, count] += row[DRY] * row[DRY]
+        target[count] += row[DRY] * row[ERROR]
+    force = _last_unknown(matrix, target, alone)
+    return force if force > 0.0 else alone
+
+
+@part()
+def _last_unknown(matrix: FloatArray, target: FloatArray, otherwise: float) -> float:
+    """The last of the unknowns that solve a positive definite system, of which the lower triangle
+    is given; its factor and the steps to the solution take their place.
+
+    Args:
+        matrix, target: of the system.
+        otherwise: what is returned if the system does not determine it.
+    """
+    last = target.size - 1
+    for i in range(last + 1):
+        whole = matrix[i, i]
+        for j in range(i):
+            for k in range(j):
+                matrix[i, j] -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] /= matrix[j, j]
+            matrix[i, i] -= matrix[i, j] ** 2
+            target[i] -= matrix[i, j] * target[j]
+        if not matrix[i, i] > SINGULAR * whole:
+            return otherwise
+        matrix[i, i] = np.sqrt(matrix[i, i])
+        target[i] /= matrix[i, i]
+    return target[last] / matrix[last, last]
 
 
 @part(allocates=True)

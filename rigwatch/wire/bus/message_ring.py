@@ -26,8 +26,11 @@ from rigwatch.wire.messages import ALARMS, TOPICS, Topic, bus_key
 from rigwatch.wire.ordering import UNKNOWN, Ask, Numbered, PastRuns, RingReply, first_fitting
 
 SAID_KEY = "said"
-RING_BYTES = 32 << 20
-"""Capacity per topic [bytes]: two minutes of estimates, months of alarms."""
+RING_BYTES, RARE_BYTES = 32 << 20, 2 << 20
+"""Capacity per topic [bytes]: two minutes of estimates; of topics whose messages come now and then
+at most the second, months of alarms, which fills within days where many are raised: a ring that
+fills for a year takes memory for a year.
+"""
 PACKED, PACK_LEVEL = 64, 1
 """Messages that are compressed together, and zstd's level: half a millisecond each second."""
 _LENGTH = struct.Struct("<I")
@@ -130,13 +133,18 @@ class MessageRing:
                 beside += pack.size if pack.first >= first else 0
 
 
+def capacity_of(topic: Topic, ring_bytes: int) -> int:
+    """Capacity of a topic's ring [bytes]."""
+    return ring_bytes if topic.rate_hz else min(ring_bytes, RARE_BYTES)
+
+
 class Outlet:
     """The numbered topics of one process: all its messages on them are sent through here.
 
     Args:
         transport: carries the bytes.
         rig, process: of the sender.
-        ring_bytes: capacity of each topic's ring [bytes].
+        ring_bytes: capacity of each topic's ring [bytes], of rare messages at most `RARE_BYTES`.
         kept: file of the alarms that are sent, None for none; it answers for earlier runs.
     """
 
@@ -152,8 +160,11 @@ class Outlet:
         self._kept = kept
         self._transport = transport
         self._rig, self._process = rig, process
-        numbered = [topic.name for topic in TOPICS if topic.numbered]
-        self._rings = {name: MessageRing(self.run, ring_bytes) for name in numbered}
+        self._rings = {
+            topic.name: MessageRing(self.run, capacity_of(topic, ring_bytes))
+            for topic in TOPICS
+            if topic.numbered
+        }
         past = kept.past if kept else None
         if kept:
             kept.begin(self.run)

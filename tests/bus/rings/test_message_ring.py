@@ -6,7 +6,8 @@ import threading
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigwatch.wire.bus.message_ring import PACKED, MessageRing
+from rigwatch.wire.bus.message_ring import PACKED, RARE_BYTES, MessageRing, capacity_of
+from rigwatch.wire.messages import ALARMS, ESTIMATES, MODELS
 from rigwatch.wire.ordering import OPEN, UNKNOWN, Ask
 
 RUN = 7
@@ -72,3 +73,9 @@ def test_a_reply_is_as_it_was_asked_for_while_the_ring_moves_on() -> None:
         asked = max(asked, reply.settled + 1)
     sender.join()
     assert asked
+
+
+def test_rare_messages_fill_a_ring_within_days_not_within_a_year() -> None:
+    assert capacity_of(ESTIMATES, 32 << 20) == 32 << 20
+    assert capacity_of(ALARMS, 32 << 20) == capacity_of(MODELS, 32 << 20) == RARE_BYTES
+    assert capacity_of(ALARMS, 1 << 10) == 1 << 10
