@@ -52,12 +52,13 @@ def drawn_ns(samples: Iterable[SampleBlock]) -> int:
 
 def _followed(samples: Iterable[SampleBlock]) -> Iterator[tuple[SampleBlock, int]]:
     """Each block, and by how much the clock has been set back before it [ns]."""
-    by_ns = last_ns = 0
+    by_ns, last_ns = 0, dict[str, int]()
     for block in samples:
-        behind_ns = last_ns - int(block.t_ns[0])
-        if last_ns and behind_ns > SET_BACK_NS:
+        first_ns = int(block.t_ns[0])
+        behind_ns = last_ns.get(block.device, first_ns) - first_ns
+        if behind_ns > SET_BACK_NS:
             by_ns += behind_ns
-        last_ns = int(block.t_ns[-1])
+        last_ns[block.device] = int(block.t_ns[-1])
         yield block, by_ns
 
 
