@@ -56,10 +56,13 @@ def row_without_keys(found: Outcome) -> Row:
     """The row of a rig whose processes have to drop what is not their owners'."""
     uncounted = max(0.0, found.sent["command"] - found.refused)
     uncounted += max(0.0, found.sent["samples"] - found.dropped)
+    uncounted += max(0.0, found.sent["numbered"] - found.foreign)
     note = (
         f"{sum(found.sent.values())} messages and queries from 4 clients of the same machine: "
         f"{found.sent['command']} forged commands, {found.refused:.0f} counted; "
         f"{found.sent['samples']} forged samples and payloads, {found.dropped:.0f} counted; "
+        f"{found.sent['numbered']} forged alarms, estimates and model changes, "
+        f"{found.foreign:.0f} counted; "
         f"{found.samples} samples compared"
     )
     return _row("hostile clients of a rig without keys", found, uncounted, note)

@@ -28,6 +28,8 @@ _RECORD_TYPES = get_type_hints(AlarmRecord)
 _INTEGERS = range(-(2**63), 2**63)
 LARGEST, KEPT = 16 << 20, 8
 """Size at which a journal is rotated [bytes], and number of older files kept."""
+MOST_WAITING = 4096
+"""Records that wait for a disk which cannot be written, some 3 MB of them."""
 LONGEST_LINE = 1 << 16
 """Longest line read, far above any line written [bytes]."""
 END = 1 << 16
@@ -44,7 +46,8 @@ class AlarmJournal:
 
     Attributes:
         failure: why the last write failed, otherwise ""; unwritten lines stay in memory for the
-            next write.
+            next write. Of more than `MOST_WAITING` only the newest of each alarm stay, and what is
+            left out is told here.
 
     Raises:
         SessionError: the file cannot be opened.
@@ -55,6 +58,7 @@ class AlarmJournal:
         self.failure = ""
         self._largest = largest
         self._waiting: list[bytes] = []
+        self._left_out = 0
         self._file: int | None = None
         try:
             self._newest = _newest(self.path)
@@ -82,7 +86,9 @@ class AlarmJournal:
         return self._file
 
     def _fail(self, error: OSError) -> None:
-        self.failure = f"{self.path}: alarm journal cannot be written: {reason_of(error)}"
+        left_out = f"; {self._left_out} records are left out" if self._left_out else ""
+        why = f"{reason_of(error)}{left_out}"
+        self.failure = f"{self.path}: alarm journal cannot be written: {why}"
 
     def write(self, records: Iterable[AlarmRecord]) -> None:
         """Append records and force them to disk; a full or read-only disk only sets `failure`.
@@ -94,6 +100,8 @@ class AlarmJournal:
             self._newest[record.alarm.name] = record
         if not (self._waiting or self.failure):
             return
+        if len(self._waiting) > MOST_WAITING:
+            self._leave_out()
         try:
             file = self._open()
             if not os.fstat(file).st_nlink:
@@ -105,7 +113,15 @@ class AlarmJournal:
         except OSError as error:
             self._fail(error)
             return
-        self.failure = ""
+        self.failure, self._left_out = "", 0
+
+    def _leave_out(self) -> None:
+        """Leave out what waits but the newest record of each alarm: a disk may be full for days."""
+        kept = [*map(_line, self._newest.values())]
+        waiting = sum(line != b"\n" for line in self._waiting)
+        self._left_out += max(0, waiting - len(kept))
+        torn = self._waiting[0].startswith(b"\n")
+        self._waiting = [b"\n", *kept] if torn else kept
 
     def newest(self) -> list[AlarmRecord]:
         """The newest record of each alarm: the initial state of a restarted monitor."""

@@ -184,15 +184,20 @@ class MonitorProcess:
 
         While those before it are read again for the filters, the earlier run's remains.
         """
+        position = self._last_judged()
+        if self._cursor and position and position == self.reader.position:
+            self._cursor.write(*position)
+
+    def _last_judged(self) -> tuple[int, int] | None:
+        """(boot, seq) of the last sample that was judged, by this run or the one before it."""
         position, done = self.reader.position, self._done
         again = position and done and position[0] == done[0] and position < done
-        if self._cursor and position and not again:
-            self._cursor.write(*position)
+        return done if again else position
 
     def look_around(self) -> None:
         """Execute commands, check the link, publish the health."""
         now_ns = self._now_ns()
-        for announced in self._operators.execute(self.rig.alarms, now_ns):
+        for announced in self._operators.execute(self.rig.alarms, now_ns, self._last_judged()):
             self.say(announced)
         self._change_models()
         for event in self._explainer.results():

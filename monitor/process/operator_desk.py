@@ -10,6 +10,7 @@ from rigwatch.wire.bus import (
     ShelvedAlarm,
     command_mark,
     marked,
+    taken,
 )
 from rigwatch.wire.messages import COMMANDS, MONITOR_STALE, AlarmCommand, Event
 
@@ -34,23 +35,31 @@ class OperatorDesk:
         lost = self._commands.dropped + self._commands.rejected + self._commands.refused
         return {"commands_refused": float(self._check.refused), "commands_lost": float(lost)}
 
-    def execute(self, alarms: AlarmManager, now_ns: int) -> Iterator[list[Announcement]]:
+    def execute(
+        self, alarms: AlarmManager, now_ns: int, position: tuple[int, int] | None = None
+    ) -> Iterator[list[Announcement]]:
         """Execute waiting commands; what to publish for each.
 
         Args:
             alarms: of the rig.
             now_ns: the monitor's Unix time [ns].
+            position: (boot, seq) of the last sample that was judged; None if there was none.
         """
         for command in self._commands.drain(MOST_COMMANDS):
             if command.name != MONITOR_STALE:  # the witness's own alarm
-                yield self._executed(alarms, command, now_ns)
+                yield self._executed(alarms, command, now_ns, position)
 
     def _executed(
-        self, alarms: AlarmManager, command: AlarmCommand, now_ns: int
+        self,
+        alarms: AlarmManager,
+        command: AlarmCommand,
+        now_ns: int,
+        position: tuple[int, int] | None,
     ) -> list[Announcement]:
         verdict, kept = self._check.judge(command), bounded(command, now_ns)
         if not verdict.refusal:
-            return list(marked(alarms.command(kept, verdict.identity), command))
+            where = [] if position is None else [taken(command, kept, SOURCE, position)]
+            return [*where, *marked(alarms.command(kept, verdict.identity), command)]
         text = f"{kept.action} of {kept.name} by {kept.user} refused: {verdict.refusal}"
         mark = command_mark(command)
         return [Event(SOURCE, now_ns, "warning", "alarm_command_refused", f"{text} ({mark})")]

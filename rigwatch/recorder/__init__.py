@@ -3,15 +3,15 @@
     bus ──▶ Feed (complete and in order) ──▶ Store (segments; waits for the disk) ──▶ session folder
 
 `folders` chooses the folder and finds the sessions of a rig; `positions` stores how far a recording
-has come, for a recorder that is restarted; `retention_rules` decides which old recordings are
-removed, here and in archives. `past` closes the gap that a cut link to a remote rig leaves.
+has come, for a recorder that is restarted; `retention` removes and thins old recordings, by rules
+that archives have too. `past` closes the gap that a cut link to a remote rig leaves.
 """
 
 from rigwatch.recorder.folders import last_block, newest, sessions_of
 from rigwatch.recorder.positions import FILES as POSITIONS
 from rigwatch.recorder.positions import load_positions
 from rigwatch.recorder.process import run
-from rigwatch.recorder.retention_rules import expired
+from rigwatch.recorder.retention import expired
 from rigwatch.recorder.several import run_several
 
 __all__ = [

@@ -182,6 +182,16 @@ class Feed:
         return sum(item.dropped for item in self._others)
 
     @property
+    def foreign(self) -> int:
+        """Alarms, estimates and model changes dropped because they were not their sender's."""
+        return sum(item.foreign for item in self._numbered.values())
+
+    @property
+    def foreign_samples(self) -> int:
+        """Samples dropped because their source has no control, or they were not their sender's."""
+        return self._reader.counters.foreign
+
+    @property
     def refused(self) -> int:
         """Messages of clients that sent more than their share."""
         return sum(item.refused for item in self._others)

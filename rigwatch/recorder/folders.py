@@ -83,6 +83,14 @@ def newest(root: Path, rig: str) -> Path:
     return found[0]
 
 
+def last_written_ns(root: Path, rig: str) -> int | None:
+    """When a file of the rig's sessions was written last [ns]; None if there is none."""
+    try:
+        return max(map(_written_ns, filter(_has_segments, sessions_of(root, rig))), default=None)
+    except OSError:
+        return None
+
+
 def choose(root: Path, run: RunInfo, longest_break: float = LONGEST_BREAK) -> Place:
     """The folder for a recording that starts at `run.t_ns`.
 
@@ -200,7 +208,7 @@ def _newest_first(root: Path, rig: str, now_ns: int) -> list[Path]:
     with contextlib.suppress(OSError, ValueError):
         last = _last(root, rig).read_text(encoding="utf-8")
     try:
-        folders = [path for path in sessions_of(root, rig) if any(path.glob(f"*{SUFFIX}"))]
+        folders = list(filter(_has_segments, sessions_of(root, rig)))
         written = {path: _written_ns(path) for path in folders}
     except OSError:
         return []
@@ -211,6 +219,10 @@ def _newest_first(root: Path, rig: str, now_ns: int) -> list[Path]:
         return not ahead, written[path]
 
     return sorted(folders, key=place, reverse=True)
+
+
+def _has_segments(folder: Path) -> bool:
+    return any(folder.glob(f"*{SUFFIX}"))
 
 
 def _written_ns(folder: Path) -> int:

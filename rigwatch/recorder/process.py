@@ -13,16 +13,21 @@ from pathlib import Path
 
 from rigwatch.recorder.disk import DiskWatch
 from rigwatch.recorder.feed import Feed
-from rigwatch.recorder.folders import LONGEST_BREAK, age_of, choose, new_folder, note_last
+from rigwatch.recorder.folders import (
+    LONGEST_BREAK,
+    age_of,
+    choose,
+    last_written_ns,
+    new_folder,
+    note_last,
+)
 from rigwatch.recorder.past import PastServer
 from rigwatch.recorder.positions import PositionFile, Positions
 from rigwatch.recorder.remote_feed import RemoteFeed
 from rigwatch.recorder.resuming import of_living
-from rigwatch.recorder.retention import Retention
-from rigwatch.recorder.retention_rules import AgeClock
+from rigwatch.recorder.retention import DAY, Retention, Thinning, clock_of
 from rigwatch.recorder.session_length import SessionLength
 from rigwatch.recorder.store import Store
-from rigwatch.recorder.thinning import Thinning
 from rigwatch.wire.bus import Bus, joined
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.host import (
@@ -75,7 +80,8 @@ class Recorder:
         self._bus, self._run = bus, run
         self._length = SessionLength(self.settings.session_days, age_of(place.folder, run))
         self._settled = self._noted = 0
-        self._disk, self._ages = DiskWatch(), AgeClock()
+        self._disk = DiskWatch()
+        self._ages = clock_of(self.settings, config.rig.id, last_written_ns(root, config.rig.id))
         self._retention = Retention(self.settings, config.rig.id)
         self._thinning = Thinning(self.settings, config.rig.id)
         self._told_at = -HEALTH_EVERY
@@ -159,8 +165,11 @@ class Recorder:
             "dropped_messages": float(self.store.dropped_messages + self.feed.dropped),
             "rejected": float(self.feed.rejected),
             "refused_messages": float(self.feed.refused),
+            "foreign_samples": float(self.feed.foreign_samples),
+            "foreign_messages": float(self.feed.foreign),
             "foreign_gaps": float(self.feed.foreign_gaps),
             "segments": float(self.store.segment_count),
+            "ages_behind_days": self._ages.lag_s / DAY,
             "free_share": -1.0 if math.isnan(share) else share,
             "disk_trouble": float(bool(self.store.failure) or self._disk.short),
         }
@@ -170,6 +179,7 @@ class Recorder:
     def close(self, now: float, t_ns: int) -> None:
         """Write waiting messages and close the session."""
         self._thinning.close()
+        self._ages.note()
         for message in [*self.feed.take(), *self.feed.rest()]:
             self.store.add(message)
         self.feed.close()

@@ -9,14 +9,15 @@ import msgspec
 from rigwatch.recorder.past.pages import Bookmark, Question
 from rigwatch.wire.bus import KEY, Bus, ModelRequest
 from rigwatch.wire.bus.commands.command_check import signed
+from rigwatch.wire.bus.commands.shelf import SHELF_KEY
 from rigwatch.wire.messages import PAST_KEY, RING_KEY, TOPICS
 from rigwatch.wire.ordering import Ask
 from tests.access.rogue import BOOT, kinds
 
 RINGS = [topic.name for topic in TOPICS if topic.numbered]
 KEYS = (
-    KEY, "monitor/standing", "monitor/receiver", RING_KEY, PAST_KEY, "source/*", "said/*/*",
-    *(f"ring/{process}/{name}" for process in ("monitor", "witness") for name in RINGS),
+    KEY, "monitor/standing", "monitor/receiver", SHELF_KEY, RING_KEY, PAST_KEY, "source/*",
+    "said/*/*", *(f"ring/{process}/{name}" for process in ("monitor", "witness") for name in RINGS),
 )  # fmt: skip
 EVER = tuple(topic.name for topic in TOPICS), 0, 2**62
 

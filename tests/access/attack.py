@@ -6,6 +6,7 @@ but oversized messages, and the processes themselves have to drop what is not th
 
 import contextlib
 import json
+import random
 import socket
 import subprocess
 import threading
@@ -28,8 +29,10 @@ from rigwatch.wire.messages import (
     GAPS,
     HEALTH,
     MODELS,
+    PAST_KEY,
     RUN,
     SAMPLES,
+    TOPICS,
     SampleBlock,
     decode,
 )
@@ -43,7 +46,8 @@ from tests.waiting import eventually
 STRANGERS = ("dashboard", "recorder", "device", "ack-eve")
 """Roles of the hostile clients, the last an operator."""
 MARK = b"\x01" * 16
-FOR_OPERATORS = (MODEL_KEY, "monitor/receiver", DEVICE_KEY, DEVICE_RUN_KEY)
+FOR_OPERATORS = (MODEL_KEY, "monitor/receiver", DEVICE_KEY, DEVICE_RUN_KEY, PAST_KEY)
+NUMBERED = tuple(topic.key for topic in TOPICS if topic.numbered)
 OF_RECORDERS = ("run", "health/recorder", "gaps/recorder")
 DROPPED = ("rejected", "foreign_samples", "duplicate_samples")
 """Counters of the monitor for what it does not take for samples of its rig."""
@@ -57,9 +61,11 @@ class Outcome:
 
     Attributes:
         sent: messages and queries by what becomes of them: "denied" by the router, "allowed",
-            "asked", a "command" or "samples" (each of them) that a process has to refuse.
+            "asked", a "command", "samples" (each of them) or what is "numbered", which a process
+            has to refuse.
         denied, refused: as counted by the router, and by monitor and witness.
         dropped: payloads and samples that the monitor has not taken for samples of its rig.
+        foreign: alarms, estimates and model changes that the recorder has not taken.
         samples, wrong: samples delivered to a reader, and those that differ from the real ones.
         ended: processes that ended.
         changes: model changes, changed model files and alarms by an operator.
@@ -70,6 +76,7 @@ class Outcome:
     denied: float = 0.0
     refused: float = 0.0
     dropped: float = 0.0
+    foreign: float = 0.0
     samples: int = 0
     wrong: int = 0
     lost: int = 0
@@ -99,16 +106,21 @@ class Attacked:
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
         self.outcome = Outcome()
         self.newest: Counter[str] = Counter()
+        self._chance = random.Random(3)
 
     def start(self) -> None:
         """Start all processes and wait for estimates."""
         rig = self.rig
         self.processes["router"] = rig.router()
-        for name in ("monitor", "witness"):
-            self.processes[name] = rig.start("-m", "rigwatch", name, str(rig.path))
+        for name, command in (
+            ("monitor", "monitor"),
+            ("witness", "witness"),
+            ("recorder", "record"),
+        ):
+            self.processes[name] = rig.start("-m", "rigwatch", command, str(rig.path))
         self.observer = rig.bus("operator-watching")
-        there = {"alive/monitor", "alive/witness"}
-        eventually(lambda: there <= set(self.observer.tokens("alive/*")), "monitor and witness")
+        there = {"alive/monitor", "alive/witness", "alive/recorder"}
+        eventually(lambda: there <= set(self.observer.tokens("alive/*")), "all processes")
         self._text = self.model.read_text()
         self._models, self._alarms = (self.observer.subscribe(t) for t in (MODELS, ALARMS))
         self._healths = self.observer.subscribe(HEALTH)
@@ -129,6 +141,7 @@ class Attacked:
         for process in ("monitor", "witness"):
             name = f"{process} commands_refused"
             eventually(lambda n=name: n in self.newest, f"the figures of the {process}")  # type: ignore[misc]
+        eventually(lambda: "recorder foreign_messages" in self.newest, "those of the recorder")
 
     def _watch(self) -> None:
         """Compare every sample delivered with the real one, and note figures and changes."""
@@ -156,11 +169,11 @@ class Attacked:
             self.outcome.wrong += not same
 
     def attack(self, messages: Iterable[tuple[str, str, bytes]], until: float) -> None:
-        """Send messages from all clients in turn, until all are sent or it is `until` [s]."""
-        for number, (how, key, payload) in enumerate(messages):
+        """Send messages, each from a client that is drawn, until all are sent or `until` [s]."""
+        for how, key, payload in messages:
             if time.monotonic() > until:
                 return
-            client = self.clients[number % len(self.clients)]
+            client = self._chance.choice(self.clients)
             _send(client, how, key, payload)
             fate = self._fate(client, how, key, payload)
             self.outcome.sent[fate] += len_of_samples(payload) if fate == "samples" else 1
@@ -195,6 +208,8 @@ class Attacked:
         outcome.refused_connections = self.newest["router refused_connections"]
         outcome.refused = self._counted("commands_refused", "commands_lost")
         outcome.dropped = self._counted(*DROPPED)
+        recorder = ("foreign_messages", "dropped_messages")
+        outcome.foreign = sum(self.newest[f"recorder {name}"] for name in recorder)
         return outcome
 
     def _counted(self, *names: str) -> float:
@@ -212,6 +227,8 @@ class Attacked:
             return "command"
         if how == "ask":
             return "asked"
+        if key in NUMBERED:
+            return "numbered"
         return "samples" if key == SAMPLES.key else "allowed"
 
 

@@ -12,7 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from rigwatch.wire.bus import DEVICE_KEY, DEVICE_RUN_KEY, KEY, MAX_PAYLOAD
+from rigwatch.wire.bus.commands.shelf import SHELF_KEY
 from rigwatch.wire.messages import (
+    PAST_KEY,
     RING_KEY,
     TOPICS,
     Alarm,
@@ -43,7 +45,8 @@ ALLOWED_SAID = ("events", "gaps", "health")
 ASKED = (
     KEY, "monitor/standing", "monitor/receiver", RING_KEY, "ring/monitor/alarms",
     "ring/monitor/estimates", "ring/monitor/models", "ring/witness/alarms", "ring/nobody/alarms",
-    "source/*", "source/0", "said/*/*", "said/monitor/0", DEVICE_KEY, DEVICE_RUN_KEY,
+    "source/*", "source/0", "said/*/*", "said/monitor/0", DEVICE_KEY, DEVICE_RUN_KEY, SHELF_KEY,
+    PAST_KEY,
 )  # fmt: skip
 _EXTREMES = (0, -1, 7, 10**9, 2**31, 2**53, 2**62, -(2**63), 2**63 - 1)
 _TEXTS = ("", "*", "eve", "x" * 5000, "\x00", "ß" * 300, "../../etc/passwd", "[" * 2000)

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from monitor.alarms import AlarmJournal, AlarmManager, read_journal
+from monitor.alarms.journal import MOST_WAITING
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import Alarm, decode, encode
 from tests.alarms.alarm_signals import condition, newest, order, run, spell
@@ -209,6 +210,35 @@ def test_a_torn_line_on_a_full_disk_does_not_keep_the_monitor_from_starting(tmp_
     journal.write(before[1:2])
     assert journal.failure == ""
     assert read_journal(path) == ([*before, *before[:2]], 1)
+
+
+def test_what_waits_for_a_full_disk_for_days_is_bounded_and_the_state_of_every_alarm_is_kept(
+    tmp_path, monkeypatch
+):
+    path, write, room, full = tmp_path / "alarms.jsonl", os.write, [7], True
+    changes = faulty_manager().take_changes()
+    journal = AlarmJournal(path)
+    journal.write(changes[:1])
+
+    def on_a_full_disk(file: int, data: bytes) -> int:
+        if full and not room:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return write(file, data[: room.pop()] if full else data)
+
+    monkeypatch.setattr(os, "write", on_a_full_disk)
+    written = 0
+    while written < 3 * MOST_WAITING:
+        journal.write(changes)
+        written += len(changes)
+        assert len(journal._waiting) <= MOST_WAITING
+    left_out = int(re.search(r"(\d+) records are left out", journal.failure)[1])
+    assert written - left_out == sum(line != b"\n" for line in journal._waiting)
+    full = False
+    journal.write([])
+    assert journal.failure == ""
+    expected = AlarmManager()
+    expected.restore(newest(changes))
+    assert restarted(path).standing() == expected.standing() != []
 
 
 def test_an_endless_line_is_one_bad_line(tmp_path):

@@ -1,12 +1,18 @@
 """What a chart shows of a long signal is what all of its samples would show."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rigwatch.browser.recordings import write_channels
 from rigwatch.browser.signals.pyramid import FIRST, HIGH, LAST, LOW, STEP, Pyramid
 from rigwatch.browser.signals.trace import Trace, open_trace, write_trace
+from rigwatch.browser.work import Results
+from rigwatch.wire.session import SessionWriter, run_info
+from tests.bus.publisher import wave
 
 
 @given(st.integers(1, 40_000), st.floats(0, 1), st.floats(0, 1), st.integers(1, 900), st.booleans())
@@ -71,3 +77,20 @@ def test_equal_steps_need_no_list_of_times(n, step, data):
     assert even.within(start, end) == listed.within(start, end)
     assert even.ends == listed.ends
     np.testing.assert_array_equal(even.at(np.arange(n)), times)
+
+
+@pytest.mark.parametrize(("by_s", "boot"), [(-3600, 7), (-200, 7), (3600, 7), (-3600, 8)])
+def test_a_clock_that_was_set_in_a_recording_does_not_turn_its_chart(tmp_path, by_s, boot):
+    whole = wave(0, 1000, 7, 10**18)
+    later = wave(500, 500, 7, 10**18)
+    later = replace(later, boot=boot, t_ns=later.t_ns + by_s * 10**9)
+    with SessionWriter(tmp_path / "set.mcap", run_info("bench", 256.0)) as writer:
+        writer.write(wave(0, 500, 7, 10**18))
+        writer.write(later)
+    kept = Results(tmp_path / "kept")
+    found = write_channels(kept, tmp_path / "set.mcap")
+    assert found["samples"] == len(whole)
+    assert found["seconds"] == pytest.approx((whole.t_ns[-1] - whole.t_ns[0]) / 1e9, abs=1e-3)
+    trace = open_trace(kept.folder / "signals", next(iter(found["channels"])))
+    times, _ = trace.between(*trace.ends, 4000)
+    assert np.all(np.diff(times) >= 0.0)

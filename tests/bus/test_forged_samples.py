@@ -185,14 +185,14 @@ def test_a_loss_by_a_wrong_position_is_of_unknown_length() -> None:
 @pytest.fixture
 def soon(monkeypatch: pytest.MonkeyPatch) -> None:
     """A source that came first and is silent is passed over soon."""
-    monkeypatch.setattr(sample_reader, "UNSURE", 0.3)
+    monkeypatch.setattr(sample_reader, "BEYOND_LEASE", 0.2)
 
 
 class Strangers:
     """A rig's daq, a stranger with a token of an early start, and a reader that begins later."""
 
-    def __init__(self, boot: int) -> None:
-        network = MemoryNetwork()
+    def __init__(self, boot: int, lease: float = 10.0) -> None:
+        network = MemoryNetwork(lease)
         self.daq, self.eve = network.bus("bench", "daq"), network.bus("bench", "eve")
         self.token = self.eve.named_token(SOURCE_KEY)
         self.token.declare(f"{boot}/1")
@@ -223,7 +223,7 @@ class Strangers:
 def test_a_stranger_who_says_that_he_came_first_and_is_silent_keeps_no_reader_away(
     boot: int,
 ) -> None:
-    bench = Strangers(boot)
+    bench = Strangers(boot, lease=0.1)
     assert wait_until(bench.reads, 10.0, 0.01)
     assert bench.codes().count("DUPLICATE SOURCE") == 1
     assert bench.reader.contested
@@ -250,9 +250,18 @@ def test_one_that_came_first_is_waited_for_as_long_as_its_token_may_outlive_it(b
     bench.reader.close()
 
 
+@pytest.mark.parametrize("boot", [7, 9])
+@pytest.mark.usefixtures("soon")
+def test_the_wait_is_longer_than_the_lease_whatever_that_is(boot: int) -> None:
+    bench = Strangers(boot, lease=2.0)
+    assert not wait_until(bench.reads, 1.5, 0.05)
+    assert wait_until(bench.reads, 10.0, 0.01)
+    bench.reader.close()
+
+
 @pytest.mark.usefixtures("soon")
 def test_an_owner_that_was_heard_is_never_passed_over() -> None:
-    bench = Strangers(9)
+    bench = Strangers(9, lease=0.1)
     bench.token.close()
     assert wait_until(bench.reads, 10.0, 0.01)
     bench.token.declare("7/1")

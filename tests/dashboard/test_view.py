@@ -1,6 +1,8 @@
 """`rigwatch view` shows a recording as a live screen would, or draws it into a file."""
 
 import json
+from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -8,11 +10,11 @@ import pytest
 from PIL import Image
 
 from rigwatch.commands import main
-from rigwatch.commands.sessions.session_messages import messages_of
+from rigwatch.commands.sessions.session_messages import length_of, messages_of
 from rigwatch.dashboard.board import palette
-from rigwatch.wire.messages import Alarm
-from rigwatch.wire.session import SessionWriter, open_session, run_info
-from tests.dashboard.rig_messages import Rig
+from rigwatch.wire.messages import Alarm, EstimateBlock, Health, Message, RunInfo, SampleBlock
+from rigwatch.wire.session import SessionWriter, message_time, open_session, run_info
+from tests.dashboard.rig_messages import START_NS, Rig
 
 RECORDINGS = Path(__file__).parents[1] / "verify"
 
@@ -86,6 +88,47 @@ def test_a_part_that_begins_after_an_alarm_shows_that_it_stands(
     view = ["view", str(session), "--start", "6", "--end", "7", "--save", str(tmp_path / "x.rrd")]
     assert main([*view, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["fault_ns"] == 0
+
+
+def set_back(message: Message, at_ns: int, by_ns: int) -> Message:
+    """A message that was said after the clock was set back at a time."""
+    t_ns = message.t_ns - by_ns * (message.t_ns >= at_ns)
+    return replace(message, t_ns=t_ns)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("back_s", [11, 3600, 10**8])
+def test_where_the_clock_was_set_back_a_recording_is_drawn_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], back_s: int
+) -> None:
+    path, steady = tmp_path / "set.mcap", list(Rig(friction_at=4.0).messages(8.0))
+    # A recorder writes a second's samples before what else was said in it.
+    by_second = sorted(steady, key=lambda one: (message_time(one) // 10**9, rank(one)))
+    with SessionWriter(path, run_info("bench", 256.0, t_ns=START_NS)) as writer:
+        for _, second in groupby(by_second, lambda one: message_time(one) // 10**9):
+            for message in second:
+                writer.write(set_back(message, START_NS + 5_250_000_000, back_s * 10**9))
+            writer.flush()
+    shown = [one for one in messages_of(open_session(path), (None, None), None) if _is_drawn(one)]
+    times = [message_time(one) for one in shown]
+    assert times == sorted(times)
+    assert times[-1] - times[0] < 8e9
+    said = [one for one in shown if isinstance(one, Alarm | Health)]
+    meant = [one.t_ns for one in steady if isinstance(one, Alarm | Health)]
+    assert [one.t_ns for one in said] == pytest.approx(meant, abs=5e6)
+    assert main(["view", str(path), "--save", str(tmp_path / "set.rrd"), "--json"]) == 0
+    drawn = json.loads(capsys.readouterr().out)
+    assert drawn["samples"] == 8 * 256
+    assert drawn["end_ns"] - drawn["start_ns"] == pytest.approx(8e9, abs=0.1e9)
+    assert length_of(open_session(path), (None, None)) == pytest.approx(8.0, abs=0.1)
+
+
+def rank(message: Message) -> int:
+    kinds = (SampleBlock, EstimateBlock)
+    return kinds.index(type(message)) if isinstance(message, kinds) else len(kinds)
+
+
+def _is_drawn(message: Message) -> bool:
+    return not isinstance(message, RunInfo)
 
 
 def test_a_recording_without_estimates_is_judged_with_a_model(

@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -16,10 +17,10 @@ from monitor.process.key_watch import KeyWatch
 from monitor.process.link_watch import LinkWatch, Seen
 from monitor.process.loop import MonitorProcess, suitable_model
 from rigwatch.wire.access import REGISTER, Issued, Register, signer_of
-from rigwatch.wire.bus.commands import alarm_command
+from rigwatch.wire.bus.commands import alarm_command, taken_at
 from rigwatch.wire.bus.commands.alarm_command import CommandAnswer, command_alarms
 from rigwatch.wire.bus.commands.alarm_list import ask_alarm_list, serve_alarm_list
-from rigwatch.wire.bus.commands.command_check import signed
+from rigwatch.wire.bus.commands.command_check import command_mark, signed
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.bus.subscription import Subscription
 from rigwatch.wire.delivery.ring import SampleRing
@@ -224,6 +225,24 @@ def test_commands_are_obeyed_and_refusals_explained(bench: Bench) -> None:
     bench.turn()
     codes = [event.code for event in bench.heard[EVENTS].drain()]
     assert "alarm_command_refused" in codes
+
+
+def test_where_a_command_was_taken_is_told(bench: Bench) -> None:
+    bench.send(wave(0, 4, 7, 0))
+    bench.turn()
+    at = Occasion("rig", 7, 0, time.time_ns())
+    bench.monitor.say(bench.monitor.rig.alarms.report("disk", at, active=True))
+    years_ahead = AlarmCommand("disk", "acknowledge", "ann", time.time_ns() + 10**18)
+    sent = signed(bench.observer, years_ahead)
+    bench.observer.publish(COMMANDS, sent)
+    bench.turn()
+    (place,) = filter(None, map(taken_at, bench.heard[EVENTS].drain()))
+    assert (place.mark, place.boot, place.seq) == (command_mark(sent), 7, 3)
+    assert abs(place.t_ns - time.time_ns()) < 60e9, "the monitor's time, not the operator's"
+    stranger = replace(sent, user="eve")
+    bench.observer.publish(COMMANDS, stranger)
+    bench.turn()
+    assert not any(map(taken_at, bench.heard[EVENTS].drain())), "refused, and not taken"
 
 
 def test_of_two_operators_at_once_one_is_obeyed_and_only_the_other_is_refused(

@@ -13,7 +13,7 @@ from rigwatch.commands import main
 from rigwatch.commands.sessions.replay import Announcer
 from rigwatch.replay.run import judge
 from rigwatch.replay.source import items
-from rigwatch.wire.bus import command_mark
+from rigwatch.wire.bus import command_mark, taken
 from rigwatch.wire.messages import cut
 from rigwatch.wire.messages.message_types import (
     Alarm,
@@ -125,6 +125,39 @@ def test_a_model_change_falls_before_its_sample_wherever_the_clock_was_set(
         elif isinstance(item, ModelChange):
             found.append((item.seq, samples))
     assert found == [(1000, 1000), (1500, 1500)]
+    assert samples == len(block)
+
+
+@pytest.mark.parametrize("ahead_s", [0, 3600 * 24 * 365])
+@pytest.mark.parametrize("back_s", [0, 120, 3600])
+@pytest.mark.parametrize("size", [7, 4096])
+def test_a_command_falls_behind_its_sample_wherever_clocks_were_set(
+    tmp_path: Path, size: int, back_s: int, ahead_s: int
+) -> None:
+    """That of the samples back, and that of the operator far ahead."""
+    path, (block,) = tmp_path / "set.mcap", open_session(FRICTION).samples()
+    later = cut(block, 1000, 1600)
+    later = replace(later, t_ns=later.t_ns - back_s * 10**9)
+    rest = replace(cut(block, 1600, len(block)), boot=9, seq=0)
+    given = []
+    with SessionWriter(path, run_info("simulated", 256.0)) as writer:
+        for part in (cut(block, 0, 1000), later, rest):
+            writer.write(part)
+        # The last is the boot's last sample: it falls before the next boot.
+        for seq, t_ns in ((999, block.t_ns[999]), (1200, later.t_ns[200]), (1599, later.t_ns[-1])):
+            command = AlarmCommand("*", "acknowledge", f"ann {seq}", int(t_ns) + ahead_s * 10**9)
+            obeyed = replace(command, t_ns=int(t_ns))
+            writer.write(command)
+            writer.write(taken(command, obeyed, "monitor/alarms", (block.boot, seq)))
+            given.append((seq + 1, obeyed))
+    found = list[tuple[int, AlarmCommand]]()
+    samples = 0
+    for item in items(open_session(path), size=size):
+        if isinstance(item, SampleBlock):
+            samples += len(item)
+        elif isinstance(item, AlarmCommand):
+            found.append((samples, item))
+    assert found == given
     assert samples == len(block)
 
 

@@ -1,6 +1,7 @@
 """Looking into, cutting and rescuing sessions, through the commands that people type."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -283,3 +284,46 @@ def test_the_rate_of_a_slow_log_is_told(tmp_path: Path, capsys: pytest.CaptureFi
     import_file(log, session, ImportMapping(channels={"level": "level[m]"}, time="t[s]"))
     assert main(["info", f"{session}"]) == 0
     assert "3 samples at 1.157e-05 Hz, longest step 86400 s" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("at", [100, 250, 999], ids=["between blocks", "within", "the last"])
+@pytest.mark.parametrize("by_s", [-3600.0, -1.0, 1.0, 3600.0, 1e8])
+def test_a_clock_that_was_set_changes_no_rate_and_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], by_s: float, at: int
+) -> None:
+    blocks = [
+        replace(one, t_ns=one.t_ns + round(by_s * 1e9) * (one.seq + np.arange(len(one)) >= at))
+        for one in (samples(seq, 100) for seq in range(0, 1000, 100))
+    ]
+    path = write(tmp_path / "set.mcap", [*blocks])
+    (device,) = output(capsys, "info", str(path))["devices"]
+    assert device["rate_hz"] == pytest.approx(256.0, rel=1e-4)
+    assert device["longest_step_s"] == pytest.approx(STEP / 1e9, rel=1e-3)
+    assert device["clock_steps"] == 1
+    assert main(["info", str(path)]) == 0
+    assert "with 0 samples missing, clock set 1 time(s)\n" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("jump_s", [0.0, 5.0, -5.0], ids=["pause", "pause and jump", "set back"])
+def test_a_pause_of_the_device_is_no_clock_that_was_set(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], jump_s: float
+) -> None:
+    late = samples(500, 500)
+    moved = late.device_us + round((2.0 + jump_s) * 1e6)
+    late = replace(late, t_ns=late.t_ns + 2 * 10**9, device_us=moved)
+    path = write(tmp_path / "paused.mcap", [samples(0, 500), late])
+    (device,) = output(capsys, "info", str(path))["devices"]
+    assert device["longest_step_s"] == pytest.approx(2.0 + STEP / 1e9)
+    assert device["clock_steps"] == 0
+
+
+def test_a_device_whose_clock_jumps_has_no_clock_that_was_set(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    late = samples(500, 500)
+    path = write(
+        tmp_path / "jump.mcap", [samples(0, 500), replace(late, device_us=late.device_us + 10**7)]
+    )
+    (device,) = output(capsys, "info", str(path))["devices"]
+    assert device["rate_hz"] == pytest.approx(256.0)
+    assert device["clock_steps"] == 0

@@ -11,6 +11,7 @@ from rigwatch.browser.recordings.visible_files import visible_files
 from rigwatch.browser.signals import write_trace
 from rigwatch.browser.work import RESULTS, Results, apart
 from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.ordering import elapsed_ns
 from rigwatch.wire.session import SUFFIX, open_session
 
 MOST = 500
@@ -53,8 +54,7 @@ def write_channels(kept: Results, path: Path) -> dict[str, Any]:
     blocks = list(open_session(path).samples())
     if not blocks:
         raise RigwatchError(f"{path.name}: found no samples")
-    t_ns = np.concatenate([block.t_ns for block in blocks])
-    times = (t_ns - t_ns[0]) / 1e9
+    times = elapsed_ns(blocks) / 1e9
     columns = [column for column in blocks[0].channels if column.values.dtype.kind == "f"]
     with kept.whole("signals") as folder:
         for column in columns:

@@ -78,6 +78,8 @@ def _device_lines(device: "DeviceSummary") -> list[str]:
         f"longest step {_step(device.longest_step_s)}, {device.boots} start(s), "
         f"{device.gaps} gap(s) with {device.missing} samples missing"
     )
+    if device.clock_steps:
+        figures += f", clock set {device.clock_steps} time(s)"
     return [figures, *(_channel_line(channel) for channel in device.channels)]
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from rigwatch.wire.errors import SessionError
 
 if TYPE_CHECKING:
+    from rigwatch.dashboard.continued import Step
     from rigwatch.wire.messages import Message
     from rigwatch.wire.session import Session
 
@@ -30,16 +31,20 @@ def messages_of(session: "Session", span: Span, model: Path | None) -> "Iterator
     Raises:
         ConfigError: the model cannot be read.
     """
+    from rigwatch.dashboard.continued import Continued, steps_back
     from rigwatch.wire.session import message_time, standing_alarms
 
     topics = _OTHERS if model is not None else [*_OTHERS, "alarms"]
-    others = (item.message for item in session.messages(topics, *span))
+    steps = steps_back(session.samples(None, *span))
+    others = _others(session, topics, span, steps)
     if model is not None:
-        return heapq.merge(others, _monitored(session, span, model), key=message_time)
+        judged = map(Continued(steps).moved, _monitored(session, span, model))
+        return heapq.merge(others, judged, key=message_time)
     # Placed at the part's start, where they still hold.
     start = span[0] or 0
     standing = (replace(alarm, t_ns=start) for alarm in standing_alarms(session, span[0]))
-    return heapq.merge(standing, others, *_recorded(session, span), key=message_time)
+    recorded = [map(Continued(steps).moved, found) for found in _recorded(session, span)]
+    return heapq.merge(standing, others, *recorded, key=message_time)
 
 
 def model_for(session: "Session", span: Span, given: Path | None) -> tuple[Path | None, bool]:
@@ -55,11 +60,10 @@ def model_for(session: "Session", span: Span, given: Path | None) -> tuple[Path 
 
 
 def length_of(session: "Session", span: Span) -> float:
-    """Time from the first to the last sample of the span [s]; 0 without samples."""
-    first = last = 0
-    for block in session.samples(None, *span):
-        first, last = first or int(block.t_ns[0]), int(block.t_ns[-1])
-    return (last - first) / 1e9
+    """Time from the first to the last sample of the span, as drawn [s]; 0 without samples."""
+    from rigwatch.dashboard.continued import drawn_ns
+
+    return drawn_ns(session.samples(None, *span)) / 1e9
 
 
 def rig_of(session: "Session") -> str:
@@ -78,6 +82,20 @@ def _configured_model(session: "Session") -> Path | None:
     except (SessionError, tomllib.TOMLDecodeError):
         return None
     return Path(name) if name and Path(name).is_file() else None
+
+
+def _others(
+    session: "Session", topics: list[str], span: Span, steps: "list[Step]"
+) -> "Iterator[Message]":
+    """The messages of topics other than those of blocks; samples tell where a clock was set."""
+    from rigwatch.dashboard.continued import Continued
+    from rigwatch.wire.messages import SAMPLES
+
+    continued, also = Continued(steps), [SAMPLES.name] if steps else []
+    for item in session.messages([*also, *topics], *span):
+        message = continued.moved(item.message)
+        if item.topic is not SAMPLES:
+            yield message
 
 
 def _recorded(session: "Session", span: Span) -> "list[Iterator[Message]]":

@@ -38,7 +38,7 @@ from rigwatch.wire.messages import (
 APPLICATION = "rigwatch"
 _WORDS_EVERY_NS = 500_000_000
 _LAYOUT_EVERY_NS = 2_000_000_000
-_SET_BACK_NS = 10_000_000_000
+SET_BACK_NS = 10_000_000_000
 """How far samples go back, at least, if their clock was set back; late ones are not that old."""
 
 
@@ -117,7 +117,7 @@ class Dashboard:
             self._say()
 
     def _samples(self, block: SampleBlock) -> None:
-        self.set_back |= self.facts.is_earlier(block, _SET_BACK_NS)
+        self.set_back |= self.facts.is_earlier(block, SET_BACK_NS)
         plots = quantities.plots_of(block.channels, quantities.SAMPLE_PLOTS, "signals")
         self._plot(plots, block.t_ns, block.channels)
         self.facts.see_samples(block)

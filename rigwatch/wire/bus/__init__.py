@@ -19,6 +19,7 @@ from rigwatch.wire.bus.commands import (
     ModelReply,
     ModelRequest,
     ShelvedAlarm,
+    TakenAt,
     Verdict,
     accept_device,
     ask_alarm_list,
@@ -32,6 +33,8 @@ from rigwatch.wire.bus.commands import (
     serve_alarm_list,
     serve_shelf,
     shelf_line,
+    taken,
+    taken_at,
 )
 from rigwatch.wire.bus.complete_subscription import CompleteSubscription, Place
 from rigwatch.wire.bus.connection import (
@@ -78,6 +81,7 @@ __all__ = [
     "SharedLinks",
     "ShelvedAlarm",
     "Subscription",
+    "TakenAt",
     "Verdict",
     "accept_device",
     "ask_alarm_list",
@@ -97,5 +101,7 @@ __all__ = [
     "serve_alarm_list",
     "serve_shelf",
     "shelf_line",
+    "taken",
+    "taken_at",
     "unique_process",
 ]

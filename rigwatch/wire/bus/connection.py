@@ -137,7 +137,8 @@ def connect(
     megabytes = config.bus.ring_megabytes
     if links:
         megabytes = min(megabytes, links.ring_megabytes)
-    return Bus(transport, config.rig.id, process, signer, round(megabytes * (1 << 20)))
+    ring_bytes = round(megabytes * (1 << 20))
+    return Bus(transport, config.rig.id, process, signer, ring_bytes, lease=config.bus.lease)
 
 
 def _client(

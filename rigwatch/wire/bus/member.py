@@ -9,6 +9,7 @@ from rigwatch.wire.bus.kept_messages import KeptMessages
 from rigwatch.wire.bus.message_ring import LARGEST_NUMBERED, RING_BYTES, Outlet
 from rigwatch.wire.bus.tokens import Changed, NamedToken, NamedTokens
 from rigwatch.wire.bus.transport import (
+    LEASE,
     MAX_PAYLOAD,
     Answer,
     Close,
@@ -30,6 +31,8 @@ class Member:
         process: name of the process, such as "daq"; a liveliness token exists while it lives.
         signer: signs the commands of this machine's operator; None for a process that sends none.
         ring_bytes: memory of the ring of each numbered topic [bytes].
+        lease: silence after which a link counts as broken: the tokens of a process may outlive it
+            by as much [s].
     """
 
     def __init__(
@@ -39,11 +42,14 @@ class Member:
         process: str,
         signer: CommandSigner | None = None,
         ring_bytes: int = RING_BYTES,
+        *,
+        lease: float = LEASE,
     ) -> None:
         self.transport = transport
         self.signer = signer
         self.rig = rig
         self.process = process
+        self.lease = lease
         self._ring_bytes = ring_bytes
         self._outlet: Outlet | None = None
         self._lock = threading.Lock()

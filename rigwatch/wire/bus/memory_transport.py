@@ -12,7 +12,15 @@ from typing import TypeVar
 
 from rigwatch.wire.access import CommandSigner
 from rigwatch.wire.bus.bus import Bus
-from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, Waiting, answered
+from rigwatch.wire.bus.transport import (
+    LEASE,
+    MAX_PAYLOAD,
+    Answer,
+    Close,
+    Receive,
+    Waiting,
+    answered,
+)
 from rigwatch.wire.messages import bus_key
 
 T = TypeVar("T")
@@ -24,7 +32,8 @@ MATCHES_KEPT = 4096
 class MemoryNetwork:
     """Counterpart of Zenoh's router: delivers everything put by one transport to all."""
 
-    def __init__(self) -> None:
+    def __init__(self, lease: float = LEASE) -> None:
+        self.lease = lease
         self.lock = threading.RLock()
         self.listeners: dict[str, list[Receive]] = {}
         self.servers: dict[str, list[Answer]] = {}
@@ -34,7 +43,7 @@ class MemoryNetwork:
 
     def bus(self, rig: str, process: str, signer: CommandSigner | None = None) -> Bus:
         """A process's bus on this network."""
-        return Bus(MemoryTransport(self), rig, process, signer)
+        return Bus(MemoryTransport(self), rig, process, signer, lease=self.lease)
 
     def deliver(self, key: str, payload: bytes, sender: str, mark: bytes) -> None:
         """Deliver a payload to all subscribers, unless it is too large or the network is down."""

@@ -7,6 +7,8 @@ from rigwatch.wire.messages import Topic, bus_key
 
 MAX_PAYLOAD = 1 << 18
 """Largest payload of a message or reply [bytes]; larger ones are refused."""
+LEASE = 10.0
+"""Silence after which a link counts as broken, unless configured [s]."""
 
 REFUSED_MARK, DENIED_MARK = b"zenoh_link_tls::unicast", b"Msg intercepted!"
 """In each line of Zenoh's log about a refused connection, and about a denied message."""

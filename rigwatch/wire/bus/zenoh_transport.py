@@ -35,7 +35,15 @@ from rigwatch.wire.bus.several import (
     Received,
     alone_key,
 )
-from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, Waiting, answered
+from rigwatch.wire.bus.transport import (
+    LEASE,
+    MAX_PAYLOAD,
+    Answer,
+    Close,
+    Receive,
+    Waiting,
+    answered,
+)
 from rigwatch.wire.errors import BusError, NoRouterError
 from rigwatch.wire.messages import bus_key
 
@@ -52,8 +60,6 @@ JOINTS_WAITING = 1024
 """Joined messages that wait, of which many rigs send up to seven in a turn: five seconds."""
 UNSURE = 1.0
 """Time after which a router has told whether anybody listens at a key [s]."""
-LEASE = 10.0
-"""Silence after which a link counts as broken [s]."""
 ACCEPT_MS, MOST_PENDING = 1000, 1000
 """Router's time limit for a connection to identify itself [ms], and number of pending ones."""
 ATTEMPT_MS = 300

@@ -44,10 +44,10 @@ SILENCE = 1.0
 """Time without a sample after which the ring is queried for more [s]."""
 CONTESTED = 1.0
 """Time for which samples sent under another process's boot count as a conflict [s]."""
-UNSURE = 15.0
-"""Time for which a source that came first may be silent while another sends, before a reader that
-has heard nothing of it passes it over: the token of one that is gone lasts as long as its link's
-lease [s]."""
+BEYOND_LEASE = 5.0
+"""Time beyond the lease of its link for which a source that came first may be silent while another
+sends, before a reader that has heard nothing of it passes it over: the token of one that is gone
+lasts as long as the lease [s]."""
 MOST_UNSURE = 16
 """Boots of which that is followed at a time: a stranger may call any number his own."""
 MOST_REJECTED = 8
@@ -101,7 +101,7 @@ class SampleReader:
         self._refused: tuple[int, str] | None = None
         self._impostor_at: float | None = None
         self._assumed: int | None = None
-        self._unsure = _Unsure()
+        self._unsure = _Unsure(bus.lease + BEYOND_LEASE)
         self._inbox: Inbox[_Incoming] = Inbox(capacity)
         self._questions = RingQuestions(bus, self._answered)
         self._heard_at = self._silence_told_at = time.monotonic()
@@ -335,9 +335,13 @@ class _Unsure:
     """How long a source that came first has been silent while another sends.
 
     Of the boot that both call theirs, or of any boot: None.
+
+    Args:
+        longest: what counts as long enough [s].
     """
 
-    def __init__(self) -> None:
+    def __init__(self, longest: float) -> None:
+        self._longest = longest
         self._since: dict[int | None, float] = {}
 
     def lasts(self, boot: int | None) -> bool:
@@ -345,7 +349,7 @@ class _Unsure:
         now = time.monotonic()
         if len(self._since) >= MOST_UNSURE and boot not in self._since:
             del self._since[next(iter(self._since))]
-        return now - self._since.setdefault(boot, now) > UNSURE
+        return now - self._since.setdefault(boot, now) > self._longest
 
     def end(self) -> None:
         """One is read."""

@@ -4,7 +4,8 @@
 boot until their turn, `source_arbitration` decides which of several sources has control,
 `ownership` which process may send for it, and `ring_protocol` defines a reader's queries to a ring.
 `past_runs` answers them for the earlier runs of a process. Samples and numbered messages use the
-same logic. `sender_rates` bounds what each client may send.
+same logic. `sender_rates` bounds what each client may send; `set_clock` tells by how much the clock
+of samples was set.
 """
 
 from rigwatch.wire.ordering.numbered import Numbered
@@ -21,6 +22,7 @@ from rigwatch.wire.ordering.past_runs import PastRun, PastRuns, first_fitting
 from rigwatch.wire.ordering.ring_protocol import EMPTY, OPEN, UNKNOWN, Ask, RingReply
 from rigwatch.wire.ordering.sample_order import LARGEST_SEQ, SampleOrder
 from rigwatch.wire.ordering.sender_rates import SenderRates
+from rigwatch.wire.ordering.set_clock import elapsed_ns, set_by_ns
 
 __all__ = [
     "EMPTY",
@@ -41,5 +43,7 @@ __all__ = [
     "RingReply",
     "SampleOrder",
     "SenderRates",
+    "elapsed_ns",
     "first_fitting",
+    "set_by_ns",
 ]

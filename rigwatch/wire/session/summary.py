@@ -20,6 +20,7 @@ from rigwatch.wire.messages import (
     blocks,
 )
 from rigwatch.wire.messages import quality_flags as quality
+from rigwatch.wire.ordering import set_by_ns
 from rigwatch.wire.session.losses import Losses, Span, count
 from rigwatch.wire.session.reader import LostSpan, Session
 from rigwatch.wire.session.writer import message_time
@@ -48,8 +49,9 @@ class DeviceSummary:
     Attributes:
         samples: number of samples.
         boots: number of starts of the device.
-        rate_hz: mean rate inside unbroken stretches [Hz].
-        longest_step_s: longest time between neighbours in a stretch [s].
+        rate_hz: mean rate inside unbroken stretches, whatever the clock was set by [Hz].
+        longest_step_s: longest time between neighbours in a stretch, likewise [s].
+        clock_steps: how often the clock of the samples was set.
         gaps: number of gaps in the sequence numbers, reported ones at the end of a start included.
         missing: number of missing samples.
     """
@@ -59,6 +61,7 @@ class DeviceSummary:
     boots: int = 0
     rate_hz: float = 0.0
     longest_step_s: float = 0.0
+    clock_steps: int = 0
     gaps: int = 0
     missing: int = 0
     channels: list[ChannelSummary] = field(default_factory=list)
@@ -173,7 +176,7 @@ class _Device:
         self._figures = DeviceSummary(name)
         self._channels: dict[str, _Channel] = {}
         self._next: dict[int, int] = {}
-        self._last: tuple[int, int, int] | None = None
+        self._last: tuple[int, int, int, int] | None = None
         self._steps = self._time_ns = 0
 
     def add(self, block: SampleBlock) -> None:
@@ -189,16 +192,22 @@ class _Device:
             self._channels.setdefault(column.name, _Channel(column)).add(column)
 
     def _measure_steps(self, block: SampleBlock) -> None:
-        t_ns = block.t_ns
+        t_ns, device_us = block.t_ns, block.device_us
         if self._last is not None and self._last[:2] == (block.boot, block.seq):
-            set_back = t_ns[0] < self._last[2]
-            t_ns = t_ns if set_back else np.concatenate([[self._last[2]], t_ns])
+            t_ns = np.concatenate([self._last[2:3], t_ns])
+            device_us = np.concatenate([self._last[3:], device_us])
         if len(t_ns) > 1:
-            longest = int(np.diff(t_ns).max()) / 1e9
+            steps = np.diff(t_ns)
+            usual = self._time_ns / self._steps if self._steps else float(np.median(steps))
+            was_set = set_by_ns(t_ns, device_us, np.arange(len(t_ns)), usual)
+            steps = (steps - was_set)[steps >= was_set]
+            self._figures.clock_steps += int(np.count_nonzero(was_set))
+            longest = int(steps.max(initial=0)) / 1e9
             self._figures.longest_step_s = max(self._figures.longest_step_s, longest)
-            self._steps += len(t_ns) - 1
-            self._time_ns += int(t_ns[-1] - t_ns[0])
-        self._last = (block.boot, block.seq + len(block), int(block.t_ns[-1]))
+            self._steps += len(steps)
+            self._time_ns += int(steps.sum())
+        end = block.seq + len(block)
+        self._last = (block.boot, end, int(block.t_ns[-1]), int(block.device_us[-1]))
 
     @property
     def boots(self) -> tuple[int, ...]:

@@ -19,6 +19,7 @@ from rigwatch.wire.bus.commands.model_change import KEY, PATIENCE, ask_for_model
 from rigwatch.wire.bus.commands.model_request import ModelReply, ModelRequest
 from rigwatch.wire.bus.commands.refusal import marked
 from rigwatch.wire.bus.commands.shelf import ShelvedAlarm, ask_shelf, serve_shelf, shelf_line
+from rigwatch.wire.bus.commands.taken import TakenAt, taken, taken_at
 
 __all__ = [
     "DEVICE_KEY",
@@ -32,6 +33,7 @@ __all__ = [
     "ModelReply",
     "ModelRequest",
     "ShelvedAlarm",
+    "TakenAt",
     "Verdict",
     "accept_device",
     "ask_alarm_list",
@@ -45,4 +47,6 @@ __all__ = [
     "serve_alarm_list",
     "serve_shelf",
     "shelf_line",
+    "taken",
+    "taken_at",
 ]

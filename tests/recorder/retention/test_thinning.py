@@ -7,8 +7,7 @@ import pytest
 
 from rigwatch.archive import Store, query
 from rigwatch.archive.one_writer import one_writer
-from rigwatch.recorder import thinning
-from rigwatch.recorder.thinning import Thinning
+from rigwatch.recorder.retention import Thinning, thinning
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.messages import EVENTS, Event
 from rigwatch.wire.rig_config import RecorderSection, load_rig

@@ -4,17 +4,11 @@ import os
 import tracemalloc
 from pathlib import Path
 
-import numpy as np
-
 from rigwatch.recorder import POSITIONS
-from rigwatch.recorder.process import Recorder, describe_run
-from rigwatch.recorder.retention import Retention
-from rigwatch.recorder.retention_rules import DAY, AgeClock
-from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.recorder.retention import DAY, Retention
 from rigwatch.wire.messages import Alarm, Event
 from rigwatch.wire.rig_config import RecorderSection
 from rigwatch.wire.session import SessionWriter, run_info
-from tests.bus.rig import TestRig
 
 NOW = 1_800_000_000.0
 
@@ -131,38 +125,6 @@ def test_the_size_stays_within_its_limit_between_two_checks(tmp_path: Path) -> N
         segment(tmp_path / "bench-20260101T000000Z", number, age_days=30.0)
     retention.update(600.0, int(NOW * 1e9), current)
     assert len(left(tmp_path)) == 4, "what was put there from elsewhere does not come again"
-
-
-def test_a_clock_that_is_years_ahead_for_a_while_makes_no_recording_old(tmp_path: Path) -> None:
-    root = tmp_path / "sessions"
-    rig = TestRig(tmp_path, f'\n[recorder]\nfolder = "{root}"\nkeep_days = 30.0\n')
-    old = segment(root / "bench-20260101T000000Z", 1, age_days=20.0)
-    bus = MemoryNetwork().bus("bench", "recorder")
-    recorder = Recorder(rig.config, describe_run(rig.path, rig.config), bus)
-
-    def passes(begin_s: float, seconds: float, ahead_s: float = 0.0) -> None:
-        """Time passes, while the wall clock is ahead."""
-        for at in np.arange(begin_s, begin_s + seconds, max(60.0, seconds / 100)):
-            recorder.turn(float(at), int((NOW + at + ahead_s) * 1e9))
-
-    passes(0.0, 3600.0)
-    passes(3600.0, 4 * 3600.0, ahead_s=10 * 365 * DAY)
-    assert old.exists()
-    passes(5 * 3600.0, 9 * DAY)
-    assert old.exists()
-    passes(9.3 * DAY, DAY)
-    assert not old.exists(), "in thirty days it is old"
-    recorder.close(11 * DAY, 0)
-
-
-def test_an_archive_s_clock_that_stays_ahead_is_followed_at_twice_the_speed() -> None:
-    ages = AgeClock()
-    assert ages.now_ns(0.0, 10**18) == 10**18
-    ahead = 10**18 + 10**13
-    assert ages.now_ns(100.0, ahead) == 10**18 + 200 * 10**9
-    assert ages.now_ns(5_100.0, ahead + 10**13) == 10**18 + 10_200 * 10**9
-    assert ages.now_ns(30_000.0, ahead + 3 * 10**13) == 10**18 + 4 * 10**13
-    assert ages.now_ns(30_001.0, 10**18) == 10**18, "back at once"
 
 
 def test_what_others_remove_is_forgotten(tmp_path: Path) -> None:

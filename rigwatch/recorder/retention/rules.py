@@ -1,8 +1,4 @@
-"""Decides which recordings are removed, by age and total size; those with alarms stay longer.
-
-What is removed is gone: a clock that is set ahead by years, and back again an hour later, must not
-make all of them old.
-"""
+"""Decides which recordings are removed, by age and total size; those with alarms stay longer."""
 
 from collections.abc import Iterable
 from typing import Protocol, TypeVar
@@ -11,26 +7,6 @@ from rigwatch.wire.rig_config import RecorderSection
 
 DAY = 86_400.0
 GIGABYTE = 1e9
-FASTEST = 2.0
-"""How fast ages grow at most, in seconds a second: a clock that was set is followed so."""
-
-
-class AgeClock:
-    """Unix time by which ages count; reads no clock.
-
-    It follows the wall clock, back at once, but forward no faster than `FASTEST`.
-    """
-
-    def __init__(self) -> None:
-        self._last: tuple[float, int] | None = None
-
-    def now_ns(self, monotonic_s: float, wall_ns: int) -> int:
-        """This time at a moment [ns], given as monotonic time [s] and Unix time [ns]."""
-        if self._last is not None:
-            then_s, before_ns = self._last
-            wall_ns = min(wall_ns, before_ns + round(FASTEST * (monotonic_s - then_s) * 1e9))
-        self._last = monotonic_s, wall_ns
-        return wall_ns
 
 
 class Recording(Protocol):

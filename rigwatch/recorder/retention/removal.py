@@ -3,6 +3,9 @@
 A closed segment states in its summary how many alarms it holds. One that does not (still open, or
 its recorder was killed) counts as one with alarms. The size stays within its limit between two
 checks too: each leaves room for as much as was recorded since the last one.
+
+A segment that was written while the clock was plainly wrong, as in 1970, is as old as the newest
+other one of its session; one of a session without others is never too old.
 """
 
 import contextlib
@@ -14,7 +17,8 @@ from pathlib import Path
 
 from rigwatch.recorder.folders import sessions_of
 from rigwatch.recorder.positions import FILES
-from rigwatch.recorder.retention_rules import expired
+from rigwatch.recorder.retention.age_clock import EARLIEST_NS
+from rigwatch.recorder.retention.rules import expired
 from rigwatch.wire.messages import ALARMS, Event
 from rigwatch.wire.rig_config import RecorderSection
 from rigwatch.wire.session import SUFFIX, topic_counts
@@ -70,7 +74,7 @@ class Retention:
         """Segments to be removed, oldest first, those without alarms before those with alarms."""
         newest = _newest(current)
         kept = _size(newest) if newest else 0
-        found = list(self._segments(newest))
+        found = list(self._segments(newest, now_s))
         self._alarms = {one.path: one.alarms for one in found}  # others remove segments too
         size = kept + _size_in(current, found)
         room = int(max(0.0, size - self._left))
@@ -78,17 +82,15 @@ class Retention:
         self._left = size - _size_in(current, gone)
         return gone
 
-    def _segments(self, newest: Path | None) -> Iterator[Segment]:
+    def _segments(self, newest: Path | None, now_s: float) -> Iterator[Segment]:
         for folder in sessions_of(Path(self._settings.folder), self._rig):
-            for entry in _segments_in(folder):
-                if newest is not None and entry.path == str(newest):
-                    continue
-                try:
-                    found = entry.stat()
-                except OSError:
-                    continue
-                alarms = self._has_alarms(entry.path)
-                yield Segment(entry.path, found.st_mtime, found.st_size, alarms)
+            found = list(_segments_in(folder))
+            dated = (one.st_mtime for _, one in found if one.st_mtime_ns >= EARLIEST_NS)
+            otherwise = max(dated, default=now_s)
+            for path, one in found:
+                if newest is None or path != str(newest):
+                    ended = one.st_mtime if one.st_mtime_ns >= EARLIEST_NS else otherwise
+                    yield Segment(path, ended, one.st_size, self._has_alarms(path))
 
     def _has_alarms(self, path: str) -> bool:
         if path not in self._alarms:
@@ -110,10 +112,13 @@ def _remove(path: Path) -> bool:
     return True
 
 
-def _segments_in(folder: Path) -> Iterator[os.DirEntry[str]]:
-    """A session's segments; none of one that is removed meanwhile."""
+def _segments_in(folder: Path) -> Iterator[tuple[str, os.stat_result]]:
+    """A session's segments; not those that are removed meanwhile."""
     with contextlib.suppress(OSError), os.scandir(folder) as found:
-        yield from (entry for entry in found if entry.name.endswith(SUFFIX))
+        for entry in found:
+            if entry.name.endswith(SUFFIX):
+                with contextlib.suppress(OSError):
+                    yield entry.path, entry.stat()
 
 
 def _newest(current: Path) -> Path | None:
