@@ -135,6 +135,7 @@ def test_samples_that_nobody_judges_are_not_called_healthy(live: bool) -> None:
     assert headline(facts) == "# NOT WATCHED"
     assert "for 3 s no estimate" in advice(facts)
     assert "armed" not in status(facts)
+    assert "Coulomb" not in advice(facts)
     for message in later(0.1):
         if isinstance(message, EstimateBlock):
             facts.see_estimates(message)

@@ -79,10 +79,8 @@ class Facts:
             newest = int(block.t_ns[-1])
             # A clock that is set back adds the block alone.
             since = self._newest_ns if 0 < self._newest_ns < newest else int(block.t_ns[0])
-            self._unjudged, self._unjudged_ns = (
-                self._unjudged + 1,
-                self._unjudged_ns + newest - since,
-            )
+            self._unjudged += 1
+            self._unjudged_ns += newest - since
             self._newest_ns = newest
         if not self._live:
             self._look_for_estimates()

@@ -108,9 +108,9 @@ def _sentence(text: str) -> str:
 
 
 def _friction_rows(facts: Facts) -> Iterator[str]:
-    """The estimates beside their thresholds and the signature of the fault."""
+    """The estimates beside their thresholds and the signature of the fault; none that are old."""
     for name, label in _ESTIMATES:
-        if name in facts.figures:
+        if name in facts.figures and not facts.unwatched_s:
             known = (
                 facts.figures.get(f"{name}_{end}", facts.marks.get(f"{name}_{end}"))
                 for end in _ENDS
