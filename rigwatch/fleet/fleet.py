@@ -1,6 +1,5 @@
 """Polls many rigs at once."""
 
-import contextlib
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -9,7 +8,7 @@ from pathlib import Path
 from rigwatch.fleet.rig_state import RigState, judged, unreachable
 from rigwatch.wire.bus import Bus, Subscription, ask_alarm_list, connect, unique_process
 from rigwatch.wire.errors import BusError, ConfigError, RigwatchError
-from rigwatch.wire.messages import ALIVE_KEY, HEALTH, Health, is_remembered
+from rigwatch.wire.messages import ALIVE_KEY, HEALTH, Alarm, Health, is_remembered
 from rigwatch.wire.rig_config import RigConfig, load_rig
 from rigwatch.wire.several_rigs import apart, valid_rigs
 
@@ -52,13 +51,17 @@ class Onlooker:
         self._hear(present)
         # The router takes a silent process for gone after a while; one that ends is gone at once.
         self._hung = self._silent(present) | (self._hung - present)
-        alarms = []
-        if "monitor" in present - self._hung:
-            with contextlib.suppress(BusError):  # it went away in between: missing the next time
-                alarms = ask_alarm_list(bus, self._timeout)
+        alarms = self._alarms(bus) if "monitor" in present - self._hung else []
         missing = [name for name in expected if name not in present | self._hung]
         hung = [name for name in expected if name in self._hung]
         return judged(rig, path, missing, alarms, self._last, hung=hung)
+
+    def _alarms(self, bus: Bus) -> list[Alarm] | None:
+        """The standing alarms; None if its monitor does not tell them."""
+        try:
+            return ask_alarm_list(bus, self._timeout)
+        except BusError:
+            return None
 
     def _silent(self, present: set[str]) -> set[str]:
         """Processes that hold their place on the bus and have said nothing for too long."""

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from rigwatch.wire.messages import Alarm, Health
 
 UNREACHABLE, GONE = 100, 90
-"""Ranks of a rig whose router does not answer, and of one that lacks a process or has one hang."""
+"""Ranks of a rig whose router does not answer, and of one that lacks a process, has one hang, or
+whose monitor does not tell its alarms."""
 ERROR = 60
 """Rank from which on a rig needs somebody now."""
 _SEVERITY = {"critical": 80, "error": ERROR, "warning": 40, "info": 20}
@@ -55,7 +56,7 @@ def judged(
     rig: str,
     config: str,
     missing: Sequence[str],
-    alarms: Sequence[Alarm],
+    alarms: Sequence[Alarm] | None,
     healths: Mapping[str, Health],
     *,
     hung: Sequence[str] = (),
@@ -66,17 +67,18 @@ def judged(
         rig: its id.
         config: path of its configuration.
         missing: processes that are not there.
-        alarms: standing ones.
+        alarms: standing ones; None if the monitor is there and does not tell them.
         healths: the last message of each process.
         hung: processes that are there and silent.
     """
-    worst = tuple(sorted(alarms, key=lambda alarm: (-rank_of(alarm), alarm.t_ns)))
+    worst = tuple(sorted(alarms or (), key=lambda alarm: (-rank_of(alarm), alarm.t_ns)))
     troubled = [one for one in healths.values() if one.state not in WELL]
     monitor = healths.get("monitor")
     rank, state = 0, "runs"
-    if missing or hung:
-        lacks = [f"{', '.join(missing)} not there"] if missing else []
-        lacks += [f"{', '.join(hung)} hangs: no sign of life"] if hung else []
+    lacks = [f"{', '.join(missing)} not there"] if missing else []
+    lacks += [f"{', '.join(hung)} hangs: no sign of life"] if hung else []
+    lacks += ["monitor does not tell its alarms"] if alarms is None else []
+    if lacks:
         rank, state = GONE, "; ".join(lacks)
     elif worst:
         rank, state = rank_of(worst[0]), worst[0].name

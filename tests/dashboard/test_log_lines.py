@@ -116,6 +116,57 @@ def test_silence_is_reported_and_ends() -> None:
     assert facts.verdict() == "healthy"
 
 
+def later(seconds: float) -> list[SampleBlock | EstimateBlock]:
+    """Samples and estimates of a rig that goes on for that long."""
+    went_on = replace(RIG, start_ns=RIG.start_ns + SECOND)
+    return [m for m in went_on.messages(seconds) if isinstance(m, SampleBlock | EstimateBlock)]
+
+
+@pytest.mark.parametrize("live", [True, False], ids=["live", "recorded"])
+def test_samples_that_nobody_judges_are_not_called_healthy(live: bool) -> None:
+    facts = moving()
+    now = RIG.start_ns + SECOND
+    facts.tell_time(now if live else None)
+    samples = [m for m in later(SILENCE + 1.0) if isinstance(m, SampleBlock)]
+    for block in samples:
+        facts.see_samples(block)
+        facts.tell_time(int(block.t_ns[-1]) if live else None)
+    assert facts.verdict() == "unwatched"
+    assert headline(facts) == "# NOT WATCHED"
+    assert "for 3 s no estimate" in advice(facts)
+    assert "armed" not in status(facts)
+    assert "Coulomb" not in advice(facts)
+    for message in later(0.1):
+        if isinstance(message, EstimateBlock):
+            facts.see_estimates(message)
+    facts.tell_time(now + 3 * SECOND if live else None)
+    facts.see_samples(samples[-1])
+    assert facts.verdict() == "healthy"
+
+
+def test_a_screen_that_draws_late_draws_all_samples_before_their_estimates() -> None:
+    facts, now = moving(), RIG.start_ns + SECOND
+    facts.tell_time(now)
+    found = later(2.0 * SILENCE)
+    for kind, see in ((SampleBlock, facts.see_samples), (EstimateBlock, facts.see_estimates)):
+        for message in found:
+            if isinstance(message, kind):
+                see(message)  # type: ignore[operator]
+            assert facts.verdict() == "healthy"
+    facts.tell_time(now + round(2.0 * SILENCE * SECOND))
+    assert facts.verdict() == "healthy"
+
+
+def test_a_slow_device_is_watched_between_two_of_its_samples() -> None:
+    facts, far = moving(), 10 * SECOND
+    for count in range(1, 5):
+        at = RIG.start_ns + count * far
+        block = next(m for m in MESSAGES if isinstance(m, SampleBlock))
+        facts.see_samples(replace(block, t_ns=block.t_ns - block.t_ns[-1] + at))
+        assert facts.verdict() == "healthy"
+        facts.see_estimates(next(m for m in MESSAGES if isinstance(m, EstimateBlock)))
+
+
 def test_age_of_the_picture() -> None:
     facts = moving()
     newest = int(RIG.t_ns(np.array(255)))

@@ -9,7 +9,7 @@ from rigwatch.commands import main
 from rigwatch.fleet import Fleet, as_lines, as_page
 from rigwatch.fleet.fleet import Onlooker
 from rigwatch.fleet.rig_state import GONE, UNREACHABLE, judged
-from rigwatch.wire.bus import Bus, connect
+from rigwatch.wire.bus import Bus, connect, serve_alarm_list
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.messages import HEALTH, MOST_SOURCES, Alarm, Health
@@ -67,6 +67,24 @@ def test_processes_that_are_made_up_are_bounded_and_those_of_the_rig_are_heard(t
     daq.publish(HEALTH, Health("daq/rig", 1, "reconnecting", "", {}))
     assert onlooker.state().state == "daq/rig: reconnecting"
     assert len(onlooker._last) == MOST_SOURCES + 1
+
+
+def test_a_monitor_that_does_not_tell_its_alarms_is_not_one_without_alarms(tmp_path: Path):
+    config, network = load_rig(rig_file(tmp_path, "r")), MemoryNetwork()
+    processes = {name: network.bus("r", name) for name in ("daq", "monitor", "recorder", "witness")}
+    onlooker = Onlooker(tmp_path, config, 0.1)
+    onlooker._bus = network.bus("r", "fleet")
+    onlooker._healths = onlooker._bus.subscribe(HEALTH)
+    for name, bus in processes.items():
+        bus.publish(HEALTH, Health(name, 1, "running", "", {}))
+    mute = onlooker.state()
+    assert (mute.missing, mute.hung) == ((), ())
+    assert (mute.rank, mute.state) == (GONE, "monitor does not tell its alarms")
+    standing = [alarm("dry_friction", "error")]
+    serve_alarm_list(processes["monitor"], lambda: standing)
+    assert onlooker.state().state == "dry_friction"
+    standing.clear()
+    assert (onlooker.state().rank, onlooker.state().state) == (0, "runs")
 
 
 def test_a_rig_whose_keys_cannot_be_read_hides_no_other(tmp_path: Path):

@@ -68,13 +68,14 @@ class Counts(NamedTuple):
     lasted: int = 13
     since_known: int = 14
     since_gap: int = 15
+    since_whole: int = 16
 
 
 AT = Counts()
 (
     HEAD, FILLED, SINCE_START, QUIET, OUTSIDE, ONSET, DEPARTURE_AGO, AGREED, DISAGREED, CHANGED,
-    ABOVE, JUMP_AGO, WAS_JUDGING, LASTED, KNOWN_AGO, GAP_AGO,
-) = range(16)  # fmt: skip
+    ABOVE, JUMP_AGO, WAS_JUDGING, LASTED, KNOWN_AGO, GAP_AGO, WHOLE_AGO,
+) = range(17)  # fmt: skip
 """Indices of `Counts` as constants for the kernel."""
 
 
@@ -90,6 +91,7 @@ class DecisionState(NamedTuple):
         lateness: of the inputs, see `lateness`.
         edges: of the inputs, see `monitor.drives.edge_choice`.
         instants: of edges that jitter, see `monitor.drives.read_instants`.
+        judged: outputs of the last sample that was judged, shape (outputs,).
     """
 
     rows: FloatArray
@@ -100,6 +102,7 @@ class DecisionState(NamedTuple):
     lateness: FloatArray
     edges: FloatArray
     instants: FloatArray
+    judged: FloatArray
 
 
 def new_state(levels: int, terms: int = 0) -> DecisionState:
@@ -115,7 +118,7 @@ def new_state(levels: int, terms: int = 0) -> DecisionState:
     rows = np.zeros((HISTORY, LEVELS + levels + terms))
     lasting, sums = np.zeros(LASTING), np.zeros(SUMS)
     inputs = no_lateness(), no_edges(), no_instants()
-    return DecisionState(rows, count, np.zeros(4), lasting, sums, *inputs)
+    return DecisionState(rows, count, np.zeros(4), lasting, sums, *inputs, np.zeros(len(OUTPUTS)))
 
 
 PASSED = np.array([[1.0, 0.0, 0.0]] * 2)

@@ -45,6 +45,7 @@ from monitor.observer.decision.decision_state import (
     UNNAMED,
     WAKE,
     WAS_JUDGING,
+    WHOLE_AGO,
     DecisionRules,
     DecisionState,
 )
@@ -100,7 +101,10 @@ def decide(  # noqa: PLR0917 -- a kernel
             follow_inputs(kept, judged[k], usual[:, k], altered[k], rules)
             _remember(kept, judged[k], speed[k], levels[k])
         _follow_jumps(jumped[k], kept)
-        _judge(k, inside[k], usual[:, k], response[k], rules, kept, out)
+        if state[k] == TAINTED:
+            _hold(k, kept, out)
+        else:
+            _judge(k, inside[k], usual[:, k], response[k], rules, kept, out)
 
 
 @part()
@@ -113,6 +117,7 @@ def _restart(kept: DecisionState) -> None:
     forget_lateness(kept.lateness)
     fill(kept.edges, 0.0)
     fill(kept.instants, 0.0)
+    fill(kept.judged, 0.0)
 
 
 @part()
@@ -174,6 +179,7 @@ def _judge(  # noqa: PLR0917 -- a kernel
     count = kept.counts
     count[SINCE_START] += 1
     count[OUTSIDE] = 0 if not inside else min(count[OUTSIDE] + 1, LONG)
+    count[WHOLE_AGO] = 0
     spread, limit, known, onset = deviate(k, usual, response, rules, kept, out)
     away = departs(out[DEVIATION, k], known, onset, kept)
     mode = _mode(kept, rules)
@@ -183,11 +189,27 @@ def _judge(  # noqa: PLR0917 -- a kernel
         fill(kept.sums, 0.0)
     if mode == JUDGING:
         follow_episode(k, away, spread, rules, kept, out)
-        return
-    count[ONSET] = -1
-    kept.value[0] = UNNAMED
-    if mode == BEYOND:
-        name_unrecorded(k, spread, limit, rules, kept, out)
+    else:
+        count[ONSET] = -1
+        kept.value[0] = UNNAMED
+        if mode == BEYOND:
+            name_unrecorded(k, spread, limit, rules, kept, out)
+    for c in range(kept.judged.size):
+        kept.judged[c] = out[c, k]
+
+
+@part()
+def _hold(k: int, kept: DecisionState, out: FloatArray) -> None:
+    """Repeat the outputs of the last sample with a whole kernel: nothing else is known by now.
+
+    What was found once is not counted again; after many such samples the rig is not watched.
+    """
+    kept.counts[SINCE_START] += 1
+    kept.counts[WHOLE_AGO] += 1
+    for c in range(kept.judged.size):
+        out[c, k] = kept.judged[c]
+    if kept.counts[WHOLE_AGO] > LONG:
+        out[MODE, k] = ARMING
 
 
 @part()

@@ -144,7 +144,8 @@ class LiveView:
         """Why the monitor does not watch; empty if it does."""
         if not self.hears(now):
             return "no samples arrive: the rig or its acquisition is stopped"
-        told = [h.text for source, (h, _) in self._health.items() if source.startswith("monitor")]
+        monitors = (own for source, own in self._health.items() if source.startswith("monitor"))
+        told = [health.text for health, at in monitors if now - at <= SILENT]
         if any(told):
             return "; ".join(filter(None, told))
         if now - self._heard.get("estimates", -math.inf) >= SILENT:

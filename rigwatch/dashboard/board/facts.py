@@ -11,7 +11,9 @@ from rigwatch.wire.bus import ShelvedAlarm
 from rigwatch.wire.messages import EstimateBlock, Health, SampleBlock
 
 SILENCE = 2.0
-"""Time without samples after which the screen reports it [s]."""
+"""Time without samples, or of samples without estimates, after which the screen reports it [s]."""
+_BLOCKS = 3
+"""Blocks of samples without estimates that are no delay, however far apart a device's are."""
 _FORGET = 0.02
 
 
@@ -44,6 +46,7 @@ class Facts:
         marks: constant figures of the model, such as "theta1_signature".
         model: the model's name.
         silent_s: time without samples [s], 0 while they come.
+        unwatched_s: length of the newest samples without estimates [s], 0 while these come.
         skipped: messages that the dashboard left out because it was slow.
         lost_alarms: alarms that never reached this screen.
         samples: samples drawn.
@@ -58,18 +61,29 @@ class Facts:
     marks: Mapping[str, float] = field(default_factory=dict)
     model: str = ""
     silent_s: float = 0.0
+    unwatched_s: float = 0.0
     skipped: int = 0
     lost_alarms: int = 0
     samples: int = 0
     _newest_ns: int = 0
     _fresh_ns: int = 0
     _drawn: int = 0
+    _unjudged: int = 0
+    _unjudged_ns: int = 0
+    _live: bool = False
 
     def see_samples(self, block: SampleBlock) -> None:
         """Record the drawn samples."""
         self.samples += len(block)
         if len(block):
-            self._newest_ns = int(block.t_ns[-1])
+            newest = int(block.t_ns[-1])
+            # A clock that is set back adds the block alone.
+            since = self._newest_ns if 0 < self._newest_ns < newest else int(block.t_ns[0])
+            self._unjudged += 1
+            self._unjudged_ns += newest - since
+            self._newest_ns = newest
+        if not self._live:
+            self._look_for_estimates()
 
     def is_earlier(self, block: SampleBlock, by_ns: int) -> bool:
         """Whether a block is that much earlier than the samples before it [ns]."""
@@ -77,19 +91,32 @@ class Facts:
 
     def see_estimates(self, block: EstimateBlock) -> None:
         """Record the last estimates."""
+        self._unjudged = self._unjudged_ns = 0
         for column in block.columns if len(block) else ():
             if np.isfinite(value := column.values[-1]):
                 self.figures[column.name] = float(value)
 
     def tell_time(self, now_ns: int | None) -> None:
-        """Record how old the newest sample is, and whether samples still arrive."""
+        """Record how old the newest sample is, and whether samples and estimates still arrive.
+
+        Live, what has arrived is drawn topic by topic, samples before their estimates: only here
+        all of it is drawn.
+        """
         if now_ns is None or not self.samples:
             return
+        self._live = True
+        self._look_for_estimates()
         if self.samples > self._drawn:
             self._drawn, self._fresh_ns = self.samples, now_ns
             self.age.add((now_ns - self._newest_ns) / 1e6)
         silent = (now_ns - self._fresh_ns) / 1e9
         self.silent_s = silent if silent > SILENCE else 0.0
+
+    def _look_for_estimates(self) -> None:
+        """Note how long samples have come without estimates, after some came."""
+        unwatched = self.figures and self._unjudged >= _BLOCKS
+        length = self._unjudged_ns / 1e9 if unwatched else 0.0
+        self.unwatched_s = length if length > SILENCE else 0.0
 
     def verdict(self) -> str:
         """The verdict as one of `palette.VERDICTS`."""
@@ -98,6 +125,8 @@ class Facts:
             return name if name in VERDICTS else "fault"
         if self.silent_s:
             return "stale"
+        if self.unwatched_s:
+            return "unwatched"
         if any(alarm.name in LANES for alarm in self.book.unseen()):
             return "over"
         if self.book.remarks():

@@ -54,6 +54,7 @@ VERDICTS: dict[str, tuple[str, Colour]] = {
     "other_fault": ("OTHER FAULT", (190, 70, 30)),
     "link": ("NOT CONNECTED", (120, 60, 150)),
     "stale": ("NO SAMPLES", (120, 60, 150)),
+    "unwatched": ("NOT WATCHED", (120, 60, 150)),
     "fault": ("FAULT", (200, 80, 60)),
 }
 """Label and colour of each verdict on the rig."""

@@ -60,6 +60,12 @@ def _verdict(facts: Facts) -> Iterator[str]:
     elif verdict == "stale":
         yield "# NO SAMPLES"
         yield f"Nothing for {facts.silent_s:.0f} s. What is drawn is old: check daq and its line."
+    elif verdict == "unwatched":
+        yield "# NOT WATCHED"
+        yield (
+            f"Samples come, but for {facts.unwatched_s:.0f} s no estimate: the monitor has ended or"
+            " hangs. Start `rigwatch monitor`, or `rigwatch up`."
+        )
     elif verdict == "over":
         yield f"# Cleared: {title(unseen[0].name)}"
         yield f"{_sentence(unseen[0].cause)} The alarm has cleared by itself; acknowledge it."
@@ -80,7 +86,7 @@ def _model(facts: Facts) -> str:
         ("armed", "armed", "not armed yet"),
         ("observable", "friction observable", "friction not observable"),
     ):
-        if name in facts.figures:
+        if name in facts.figures and not facts.unwatched_s:
             parts.append(yes if facts.figures[name] else no)
     return ", ".join(filter(None, parts))
 
@@ -102,9 +108,9 @@ def _sentence(text: str) -> str:
 
 
 def _friction_rows(facts: Facts) -> Iterator[str]:
-    """The estimates beside their thresholds and the signature of the fault."""
+    """The estimates beside their thresholds and the signature of the fault; none that are old."""
     for name, label in _ESTIMATES:
-        if name in facts.figures:
+        if name in facts.figures and not facts.unwatched_s:
             known = (
                 facts.figures.get(f"{name}_{end}", facts.marks.get(f"{name}_{end}"))
                 for end in _ENDS

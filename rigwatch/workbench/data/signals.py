@@ -5,7 +5,7 @@ them everywhere; outputs that are simulated from such an input, up to the end of
 count.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,6 +38,8 @@ ONE_STEP = ": a further log, or one in which they change more than once"
 """What to do about held-out data without a change, as of a log of one step."""
 INVENTED = "without a valid input"
 """Words of the remark on samples at which an input is interpolated."""
+SHARED = 2.0
+"""Samples that two parts of a session may share, as their ends are rounded."""
 MOST_MISSING = 0.2
 """Largest share of samples that may be missing from an input."""
 
@@ -138,7 +140,22 @@ def _tables(study: Study, remarks: list[str]) -> dict[str, list[Columns]]:
             "held_out: a recording has the same samples as one in training: its error is no"
             " evidence for a model"
         )
+    else:
+        remarks += _judged_and_fitted(file, tables["held_out"])
     return tables
+
+
+def _judged_and_fitted(file: StudyFile, held_out: Sequence[Columns]) -> Iterator[str]:
+    """Remarks on parts of sessions that are held out and also in training."""
+    for span, table in zip(file.held_out, held_out, strict=True):
+        for other in file.train:
+            first, last = max(span.start, other.start), min(span.end, other.end)
+            last = min(last, span.start + len(table) * table.dt)
+            if other.session == span.session and last - first > SHARED * table.dt:
+                yield (
+                    f"held_out: {span.session} from {first:g} to {last:.4g} s is in training, too:"
+                    " its error there is no evidence for a model"
+                )
 
 
 def _usual(tables: Mapping[str, Sequence[Columns]], dt: float) -> int:

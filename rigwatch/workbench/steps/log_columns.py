@@ -13,6 +13,23 @@ from rigwatch.wire.units import is_unit, may_count_turns, unit_of
 
 TIMES = ("time", "t", "timestamp", "time_stamp", "seconds", "sec")
 """Names of a time column."""
+SET_VALUES = frozenset(
+    (
+        "cmd",
+        "command",
+        "commanded",
+        "demand",
+        "desired",
+        "goal",
+        "ref",
+        "reference",
+        "setpoint",
+        "soll",
+        "sp",
+        "target",
+    )
+)
+"""Words in the name of a column that has a set value, which no sensor has read."""
 PER_MINUTE = Fraction(1, 60)
 IN_CELSIUS = "; for degrees Celsius give --map '{channel}={column}[degC]'"
 _GIVEN_UNIT = re.compile(r"\[\s*([^\[\]]*?)\s*\]\s*$")
@@ -62,7 +79,7 @@ def matched(
     free = [h for h in headers if h is not time and not when.startswith(h.column)]
     signals: dict[str, Input | Output] = {**model.inputs, **model.outputs}
     found, missing, remarks = _read(signals, given, headers, free)
-    rates = _derived(signals, missing, columns)
+    rates = _derived(model, missing, columns)
     if time is not None:
         when, more = _as_time(time, dated)
         remarks += more
@@ -121,17 +138,33 @@ def _read(
 
 
 def _derived(
-    signals: Mapping[str, Input | Output], missing: Sequence[str], columns: Sequence[str]
+    model: Model, missing: Sequence[str], columns: Sequence[str]
 ) -> dict[str, tuple[str, int]]:
-    """The source channel and the number of differentiations of each signal without a column."""
-    measured = {s.channel or name: s for name, s in signals.items() if name not in missing}
+    """The source channel and the number of differentiations of each signal without a column.
+
+    Raises:
+        ModelError: a signal is the rate of no channel, or may be that of several.
+    """
+    signals: dict[str, Input | Output] = {**model.inputs, **model.outputs}
     rates = dict[str, tuple[str, int]]()
     for name in missing:
-        channel, made = signals[name].channel or name, _rate(signals[name], measured)
-        if made is None:
-            raise ModelError(_unknown(name, channel, signals[name], columns))
-        rates[channel] = made
+        # What drives a machine, as a set value, does not tell how the machine has moved.
+        sides = (model.inputs, model.outputs) if name in model.inputs else (model.outputs,)
+        found = [_rates(signals[name], _measured_of(side, missing)) for side in sides]
+        made = _nearest_named(name, next(filter(None, found), []))
+        channel = signals[name].channel or name
+        if len(made) != 1:
+            told = [source for source, _ in made]
+            raise ModelError(_unknown(name, channel, signals[name], columns, told))
+        (rates[channel],) = made
     return rates
+
+
+def _measured_of(
+    signals: Mapping[str, Input] | Mapping[str, Output], missing: Sequence[str]
+) -> dict[str, Input | Output]:
+    """The signals that have a column, by channel."""
+    return {own.channel or name: own for name, own in signals.items() if name not in missing}
 
 
 def _as_time(time: Header, dated: Collection[str]) -> tuple[str, list[str]]:
@@ -192,6 +225,7 @@ def _named(name: str, signal: Input | Output, headers: Sequence[Header]) -> Head
     suiting = [header for header in headers if not header.units or _fits(header, signal)]
     wanted = {name.lower(), (signal.channel or name).lower()}
     named = [header for header in suiting if header.name in wanted]
+    suiting = [header for header in suiting if not _is_set_value(header, signal)]
     alike = [h for h in suiting if any(_within(word, h.name) for word in wanted)]
     return next((chosen[0] for chosen in (named, alike) if len(chosen) == 1), None)
 
@@ -199,10 +233,22 @@ def _named(name: str, signal: Input | Output, headers: Sequence[Header]) -> Head
 def _measured(_name: str, signal: Input | Output, headers: Sequence[Header]) -> Header | None:
     """The column of a signal if it is the only one with a matching unit that no name took."""
     suiting = [header for header in headers if header.units and _fits(header, signal)]
+    suiting = [header for header in suiting if not _is_set_value(header, signal)]
     return suiting[0] if len(suiting) == 1 else None
 
 
+def _is_set_value(header: Header, signal: Input | Output) -> bool:
+    """Whether a column has what an output should be, and not what it is."""
+    return isinstance(signal, Output) and not SET_VALUES.isdisjoint(header.name.split("_"))
+
+
 def _within(word: str, name: str) -> bool:
+    """Whether a signal's name is a part of a column's, or begins with it.
+
+    A letter is in most words: it has to be one by itself, as in `x_1`.
+    """
+    if len(word) == 1:
+        return word in name.split("_")
     return word in name or (len(name) > 1 and word.startswith(name))
 
 
@@ -269,21 +315,47 @@ def _no_unit(header: Header, option: str) -> str:
     )
 
 
-def _rate(signal: Input | Output, measured: Mapping[str, Input | Output]) -> tuple[str, int] | None:
-    """The channel whose derivative a signal is, and the order of the derivative."""
+def _rates(signal: Input | Output, measured: Mapping[str, Input | Output]) -> list[tuple[str, int]]:
+    """The channels whose derivative of the lowest order a signal may be, and that order."""
     own = unit_of(signal.shown or signal.unit).dimension
     for order in (1, 2):
-        for channel, other in measured.items():
-            if unit_of(f"({other.shown or other.unit})/s^{order}").dimension == own:
-                return channel, order
-    return None
+        found = [
+            (channel, order)
+            for channel, other in measured.items()
+            if unit_of(f"({other.shown or other.unit})/s^{order}").dimension == own
+        ]
+        if found:
+            return found
+    return []
 
 
-def _unknown(name: str, channel: str, signal: Input | Output, columns: Sequence[str]) -> str:
+def _nearest_named(name: str, found: list[tuple[str, int]]) -> list[tuple[str, int]]:
+    """Of several channels those that share most words with a signal, as `load_angle` does with
+    `load_speed`."""
+    words = set(name.split("_"))
+    shared = [len(words & set(channel.split("_"))) for channel, _ in found]
+    return [each for each, count in zip(found, shared, strict=True) if count == max(shared)]
+
+
+def _unknown(
+    name: str,
+    channel: str,
+    signal: Input | Output,
+    columns: Sequence[str],
+    sources: Sequence[str] = (),
+) -> str:
+    """That no column is a signal's, and what to do.
+
+    Args:
+        name, channel, signal: the signal.
+        columns: of the log.
+        sources: channels of which it may be the rate, if there are several.
+    """
     suiting = [c for c in columns if (h := read_header(c)).units and _fits(h, signal)]
     unit = signal.shown or signal.unit
     options = [f"--map '{channel}={column}'" for column in suiting]
+    rate = f", which may be the rate of {' or '.join(sources)}" if sources else ""
     return (
-        f"found no unique column for {name} [{unit}] among {', '.join(columns)};"
+        f"found no unique column for {name} [{unit}]{rate} among {', '.join(columns)};"
         f" expected {' or '.join(options) or f'--map {channel}=COLUMN[{unit}]'}"
     )

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from msgspec import structs
 
@@ -11,7 +12,7 @@ from monitor.model.model_file import model_text
 from rigwatch.browser.rig import TooSoonError, study_of_alarm
 from rigwatch.simulated import EPOCH_NS, simulate, write_session
 from rigwatch.wire.errors import SessionError
-from rigwatch.wire.messages import Alarm
+from rigwatch.wire.messages import Alarm, Column, EstimateBlock
 from rigwatch.wire.rig_config import RigConfig, load_rig
 from rigwatch.wire.session import open_session, run_info
 from rigwatch.wire.session.writer import SessionWriter
@@ -61,8 +62,8 @@ def _alarm(recorded: Path, onset: int = ONSET, after: float = 0.2) -> Alarm:
     )  # fmt: skip
 
 
-def _until(recorded: Path, folder: Path, seconds: float, *alarms: Alarm) -> None:
-    """A recorder's session of the first seconds, with alarms."""
+def _until(recorded: Path, folder: Path, seconds: float, *alarms: Alarm | EstimateBlock) -> None:
+    """A recorder's session of the first seconds, with alarms and estimates."""
     end = EPOCH_NS + round(seconds * 1e9)
     with SessionWriter(folder / "000001.mcap", run_info("story", RATE, t_ns=EPOCH_NS)) as writer:
         for block in open_session(recorded).samples(end=end, size=64):
@@ -135,6 +136,68 @@ def test_a_fault_that_passed_ends_where_its_alarm_cleared(
     _until(recorded, folder, 30.0, raised, cleared)
     study = study_of_alarm(tmp_path, config, raised, LONG_AGO)
     assert _spans(study)["fault"] == pytest.approx((0.5, 5.7), abs=0.01)
+
+
+def _verdicts(recorded: Path, *spans: tuple[float, float]) -> EstimateBlock:
+    """Thirty seconds of estimates, with friction named between times after the onset [s]."""
+    seq = np.arange(30 * RATE)
+    after = (seq - ONSET) / RATE
+    named = np.any([(after >= begin) & (after < end) for begin, end in spans], axis=0)
+    t_ns = EPOCH_NS + np.round(seq / RATE * 1e9).astype(np.int64)
+    boot = next(open_session(recorded).samples()).boot
+    return EstimateBlock("rig", boot, 0, t_ns, (Column("verdict", "", named * 1.0),))
+
+
+def test_a_fault_that_passed_ends_as_many_samples_before_on_a_slower_rig(
+    recorded: Path, config: RigConfig, folder: Path, tmp_path: Path
+) -> None:
+    slower = 4
+    slow = structs.replace(config, rig=structs.replace(config.rig, sample_rate=RATE / slower))
+    raised = _alarm(recorded)
+    at = replace(raised, seq=raised.seq // slower, onset_seq=raised.onset_seq // slower)
+    # The fault lasts for five seconds; 128 quiet samples end it, and 256 more clear its alarm.
+    end = raised.t_ns + round((5.0 - 0.2 + 384 * slower / RATE) * 1e9)
+    cleared = replace(at, state="cleared_unacknowledged", t_ns=end)
+    info = run_info("story", RATE // slower, t_ns=EPOCH_NS)
+    with SessionWriter(folder / "000001.mcap", info) as writer:
+        for block in open_session(recorded).samples(size=64):
+            columns = [
+                replace(one, values=one.values[::slower], quality=one.quality[::slower])
+                for one in block.channels
+            ]
+            writer.write(
+                replace(
+                    block, seq=block.seq // slower, device_us=block.device_us[::slower],
+                    t_ns=block.t_ns[::slower], channels=tuple(columns),
+                )
+            )  # fmt: skip
+        writer.write(at)
+        writer.write(cleared)
+    study = study_of_alarm(tmp_path, slow, at, LONG_AGO)
+    assert _spans(study)["fault"] == pytest.approx((0.5, 5.0), abs=0.05)
+
+
+def test_an_alarm_that_was_acknowledged_ends_with_the_monitors_verdict(
+    recorded: Path, config: RigConfig, folder: Path, tmp_path: Path
+) -> None:
+    raised = _alarm(recorded)
+    seen = replace(raised, state="acknowledged", t_ns=raised.t_ns + 3_000_000_000, user="op")
+    # A verdict that comes back before the alarm would clear has not ended.
+    _until(recorded, folder, 30.0, raised, seen, _verdicts(recorded, (0.2, 4.0), (4.5, 7.0)))
+    study = study_of_alarm(tmp_path, config, seen, LONG_AGO)
+    assert _spans(study)["fault"] == pytest.approx((0.5, 6.5), abs=0.01)
+
+
+@pytest.mark.parametrize("told_by", ["verdict", "alarm"])
+def test_what_was_faulty_shortly_before_is_not_healthy(
+    recorded: Path, config: RigConfig, folder: Path, tmp_path: Path, told_by: str
+) -> None:
+    raised = _alarm(recorded)
+    before = replace(raised, state="cleared_unacknowledged", t_ns=raised.t_ns - 2_200_000_000)
+    told = before if told_by == "alarm" else _verdicts(recorded, (-7.0, -3.0), (0.2, 20.0))
+    _until(recorded, folder, 30.0, told)
+    with pytest.raises(SessionError, match=r"found 3\.0 s recorded between an earlier fault and"):
+        study_of_alarm(tmp_path, config, raised, LONG_AGO)
 
 
 def test_an_onset_that_was_not_recorded_is_told(

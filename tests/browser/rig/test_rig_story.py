@@ -113,6 +113,9 @@ def test_why_the_monitor_does_not_watch() -> None:
     live.take(Health("monitor", 0, "unsuitable", "the model needs a channel", {}), 0.0)
     live._heard["samples"] = 0.0
     assert live.states(1.0, 3.0)["why"] == "the model needs a channel"
+    live._heard["samples"] = 5.0
+    assert "no monitor runs" in live.states(5.0, 3.0)["why"], "what one that has gone said is old"
+    live._heard["samples"] = 0.0
     live.take(Health("monitor", 0, "running", "", {}), 1.0)
     assert "no monitor runs" in live.states(1.0, 3.0)["why"]
     live._heard["estimates"], live._figures = 1.0, {"armed": 0.0}

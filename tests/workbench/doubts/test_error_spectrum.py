@@ -1,6 +1,7 @@
 """The model's own error along a motion, by frequency, from its error along the healthy motion."""
 
 import numpy as np
+import pytest
 from scipy.signal import butter, sosfilt
 
 from rigwatch.wire.arrays import FloatArray
@@ -53,6 +54,20 @@ def test_samples_that_do_not_count_hold_nothing() -> None:
 
     assert expected().beyond(left[None], RMS) > 1
     assert expected().beyond(left[None], RMS, calm) < 0.1
+
+
+@pytest.mark.parametrize("resting", [0.0, 0.6])
+@pytest.mark.parametrize("within", [False, True])
+def test_invalid_samples_hold_no_energy_and_take_none_away(resting: float, *, within: bool) -> None:
+    """Whether or not they are among those that count."""
+    tone = 0.2 * np.sin(0.08 * np.pi * np.arange(LENGTH))[:, None]
+    place = np.arange(LENGTH) % 512 / 512
+    invalid = place < resting
+    calm = (place < resting if within else np.zeros(LENGTH, np.bool_)) | (place >= 0.8)
+    left = np.where(invalid[:, None], np.nan, tone)
+
+    whole = expected().beyond(tone[None], RMS)
+    assert expected().beyond(left[None], RMS, calm[None]) == pytest.approx(whole, rel=0.15)
 
 
 def test_a_short_recording_has_no_spectrum() -> None:

@@ -142,7 +142,9 @@ def test_repeats_count_from_the_second_step_on_for_outputs_that_follow_at_once(
     assert repeats_at_once(cast("Study", study)) == counts
 
 
-def repeated(levels: tuple[float, ...], step: float = 0.0) -> tuple[Fit, Recording]:
+def repeated(
+    levels: tuple[float, ...], step: float = 0.0, periods: tuple[int, ...] = (100,) * 3
+) -> tuple[Fit, Recording]:
     """A tone that repeats after 100 samples, in recordings of other sizes and phases.
 
     What a wrong model leaves of it is a tenth of it.
@@ -150,9 +152,11 @@ def repeated(levels: tuple[float, ...], step: float = 0.0) -> tuple[Fit, Recordi
     Args:
         levels: amplitude of each recording; the next begins a quarter of a period later.
         step: of the converter, which then hides the noise; 0 for noise without a converter.
+        periods: of each recording [samples].
     """
     n, draw = np.arange(1000), np.random.default_rng(7)
-    tones = [a * np.sin(2 * np.pi * n / 100 + np.pi / 2 * k) for k, a in enumerate(levels)]
+    every = zip(levels, periods, strict=False)
+    tones = [a * np.sin(2 * np.pi * n / p + np.pi / 2 * k) for k, (a, p) in enumerate(every)]
     noise = [NOISE * draw.normal(size=len(n)) for _ in levels]
     outputs = [
         np.round(t / step) * step if step else t + e for t, e in zip(tones, noise, strict=True)
@@ -166,12 +170,41 @@ def repeated(levels: tuple[float, ...], step: float = 0.0) -> tuple[Fit, Recordi
 
 
 @pytest.mark.parametrize("levels", [(1.0,), (1.0, 0.2), (1.0, 0.6, 0.3)])
-def test_periods_are_compared_within_a_recording(levels: tuple[float, ...]) -> None:
+@pytest.mark.parametrize("stated", [False, True])
+def test_periods_are_found_and_compared_within_a_recording(
+    levels: tuple[float, ...], *, stated: bool
+) -> None:
     fitted, recording = repeated(levels)
-    floor = from_residual(fitted, recording, 100 / RATE, len(recording))
+    floor = from_residual(fitted, recording, stated * 100 / RATE, len(recording))
     assert floor.method == "periods"
     assert floor.rms == pytest.approx([NOISE], rel=0.05)
     assert floor.ratio(fitted) > 5
+
+
+@pytest.mark.parametrize(("periods", "found"), [((50, 125), True), ((100, 143), False)])
+def test_recordings_of_several_periods_repeat_after_a_common_one(
+    periods: tuple[int, int], found: bool
+) -> None:
+    fitted, recording = repeated((1.0, 0.5), periods=periods)
+    floor = from_residual(fitted, recording, 0.0, len(recording))
+    assert (floor.method == "periods") == found
+    if found:
+        assert floor.rms == pytest.approx([NOISE], rel=0.05)
+
+
+@pytest.mark.parametrize(("samples", "found"), [(150, True), (500, False)])
+def test_only_a_recording_that_holds_two_periods_speaks_against_one(
+    samples: int, found: bool
+) -> None:
+    fitted, recording = repeated((1.0,))
+    random = np.random.default_rng(2)
+    other = random.normal(size=(samples, 1))
+    both = joined([recording, Recording(1 / RATE, other, other)])
+    left = NOISE * random.normal(size=(1, samples, 1))
+    residuals = np.concatenate([fitted.residuals, left], axis=1)
+    fitted = cast("Fit", SimpleNamespace(residuals=residuals, rms=residuals.std(axis=(0, 1))))
+    floor = from_residual(fitted, both, 0.0, len(both))
+    assert (floor.method == "periods") == found
 
 
 def test_a_converter_that_hides_the_noise_leaves_what_it_rounds() -> None:

@@ -49,6 +49,19 @@ def test_a_study_file_whose_held_out_recording_is_a_copy_is_told_so(tmp_path):
     assert not any("no evidence" in remark for remark in apart)
 
 
+def test_a_study_file_whose_held_out_part_is_also_in_training_is_told_so(tmp_path, run):
+    assert new(tmp_path, written(tmp_path / "run.csv", run)) == 0
+    study = open_study(tmp_path / "study")
+    assert not any("no evidence" in remark for remark in prepare(study).remarks)
+    (train,), (held_out,) = study.file.train, study.file.held_out
+    assert train.end == held_out.start
+    text = study.text.replace(f"start = {held_out.start:.6g}", "start = 2.0")
+    (tmp_path / "study" / "study.toml").write_text(text)
+    told = [one for one in prepare(open_study(tmp_path / "study")).remarks if "no evidence" in one]
+    (remark,) = told
+    assert remark.startswith(f"held_out: run.mcap from 2 to {train.end:.4g} s is in training, too")
+
+
 def test_a_folder_of_logs_is_not_a_log(tmp_path, capsys):
     assert new(tmp_path, tmp_path) == 2
     assert f"found a folder, expected a file such as {tmp_path}/*.csv" in capsys.readouterr().err

@@ -30,6 +30,7 @@ from rigwatch.physics.engine.equations.expression import names_in
 from rigwatch.physics.engine.equations.model import Input, Model, Output
 from rigwatch.physics.engine.equations.quantities import names_reached, spelt_out
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.units import unit_of
 
 RATE_SUFFIX = "_rate"
 """Suffix of the output that is the balance of a state, after the state's name."""
@@ -95,10 +96,16 @@ def sensor_states(model: Model) -> frozenset[str]:
 
 
 def predicted_outputs(model: Model) -> tuple[str, ...]:
-    """Outputs that are not simply a measured state, by name."""
+    """Outputs that are not simply a measured state, by name; first those that measure a balance.
+
+    A load cell may be listed before the accelerometer, which shows the same motion as the sensors
+    that drive the model.
+    """
     given = {state.name for state in measured_states(model)} | set(model.parameters)
-    outputs = spelt_out(model).outputs
-    return tuple(n for n, output in outputs.items() if not _named(output.expression) <= given)
+    outputs, states = spelt_out(model).outputs, model.states
+    found = [n for n, output in outputs.items() if not _named(output.expression) <= given]
+    rates = [unit_of(f"({states[s.name].unit})/s").dimension for s in balanced_states(model)]
+    return tuple(sorted(found, key=lambda n: unit_of(outputs[n].unit).dimension not in rates))
 
 
 def unjudged_along_motion(model: Model) -> frozenset[str]:

@@ -51,8 +51,14 @@ class ErrorSpectrum:
         found = band_energy(counted)
         if found is None:
             return np.inf
-        share = 1.0 if at is None else float(at.mean())
+        share = 1.0 if at is None else _share(residuals, at)
         return float(np.mean(np.maximum(found / share - self.energy, 0.0).sum(axis=0) / rms**2))
+
+
+def _share(residuals: FloatArray, at: BoolArray) -> float:
+    """Share of the samples of a spectrum that count: invalid ones are in none, unless set to 0."""
+    valid = np.isfinite(residuals).all(axis=-1)
+    return float((at & valid).sum() / max(int((valid | ~at).sum()), 1))
 
 
 def expected_error(

@@ -14,7 +14,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from rigwatch.physics.engine.fit import Fit, Recording
+from rigwatch.physics.engine.fit import Fit, Recording, apart
 from rigwatch.physics.transfer import period_by_correlation, shortest_period
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.workbench.data.noise.error_spectrum import ErrorSpectrum
@@ -49,6 +49,7 @@ FEWEST_PERIODS = 3
 REPEATED = 2e-4
 """Mean square difference of an input one period later, relative to its own; rms 1 % of each."""
 _PERIODS: WeakKeyDictionary[Recording, int] = WeakKeyDictionary()
+_WITHIN: WeakKeyDictionary[Recording, int] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +140,7 @@ def from_residual(
             leaves repeats with them.
     """
     factor = recording.thinning.factor if recording.thinning else 1
-    samples = round(period / recording.dt) if period else find_period(recording)
+    samples = round(period / recording.dt) if period else _period_within(recording)
     series = fitted.residuals.reshape(-1, fitted.residuals.shape[-1])
     if samples and (samples % horizon == 0 or len(fitted.residuals) == 1) and samples % factor == 0:
         found = _between(_apart(series, recording), samples // factor)
@@ -209,6 +210,26 @@ def find_period(recording: Recording) -> int:
     if recording not in _PERIODS:
         _PERIODS[recording] = _common_period(recording)
     return _PERIODS[recording]
+
+
+def _period_within(recording: Recording) -> int:
+    """The same for each of the concatenated recordings by itself, which may begin anywhere in it.
+
+    One that is too short to hold it twice tells nothing, for or against it.
+    """
+    if len(recording.slices) == 1:
+        return find_period(recording)
+    if recording not in _WITHIN:
+        _WITHIN[recording] = _period_of_each(apart(recording))
+    return _WITHIN[recording]
+
+
+def _period_of_each(recordings: Sequence[Recording]) -> int:
+    periods = [_common_period(each) for each in recordings]
+    common = math.lcm(*filter(None, periods)) if any(periods) else 0
+    lengths = [len(each) // 2 for each, own in zip(recordings, periods, strict=True) if not own]
+    told = common <= max(map(len, recordings)) // 2 and all(half < common for half in lengths)
+    return common if told else 0
 
 
 def _common_period(recording: Recording) -> int:
