@@ -11,7 +11,7 @@ from dataclasses import replace
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.fit import Fitted
-from rigwatch.workbench.ranking import MATERIAL, Ranked
+from rigwatch.workbench.ranking import MATERIAL, Ranked, difference, error_ratio
 from rigwatch.workbench.study import told
 
 SHOWN = 1e-3
@@ -47,6 +47,27 @@ def asked_by_training(base: Fitted, rows: Sequence[Ranked]) -> Ranked | None:
     """
     asked = [row for row in rows if not (row.accepted or row.vague) and _asked_for(base, row)]
     return min(asked, key=_train_error, default=None)
+
+
+def trains_far_better(best: Ranked, row: Ranked) -> bool:
+    """Whether a fit leaves far less of the training than the best's, and less of what is held out.
+
+    Far less is a material fall of the error that is certainly more than chance.
+    """
+    assert best.fitted is not None
+    assert row.fitted is not None
+    trained = difference(best.fitted.train, row.fitted.train)
+    held_out = difference(best.fitted.held_out, row.fitted.held_out)
+    certain = trained.relative > MATERIAL and trained.p_falls < SHOWN
+    return certain and held_out.mean > 0.0
+
+
+def no_worse(best: Ranked, row: Ranked) -> bool:
+    """Whether a fit leaves no more than the best's beside its set, held out and of the training."""
+    assert best.fitted is not None
+    assert row.fitted is not None
+    trained = row.fitted.train_error / best.fitted.train_error
+    return max(trained, error_ratio(best, row)) < 1 + MATERIAL
 
 
 def _asked_for(base: Fitted, row: Ranked) -> bool:

@@ -26,6 +26,11 @@ def stop_below(x: np.ndarray, v: np.ndarray) -> np.ndarray:
     return 60 * np.minimum(x + 0.011, 0.0)
 
 
+def soft_stop_below(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """A soft stop on one side, which a stop on both sides and a bent spring make up together."""
+    return 2 * np.minimum(x + 0.011, 0.0)
+
+
 def binding(x: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Dry friction at one place of the stroke."""
     return 0.2 * np.tanh(v / 0.002) * np.exp(-(((x - 0.008) / 0.002) ** 2))
@@ -43,6 +48,11 @@ def behind_gap(x: np.ndarray, v: np.ndarray) -> np.ndarray:
         before, pushed = pushed, float(np.clip(pushed, x[i] - 0.003, x[i] + 0.003))
         force[i] = np.clip(force[i - 1] + 100.0 * (pushed - before), -0.4, 0.4)
     return force
+
+
+def weak_gap(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """The same slider, so weak that one without a gap leaves little more than noise."""
+    return 0.01 * behind_gap(x, v)
 
 
 def logged(path: Path, seed: int, law: Law | None = None, stroke: float = 0.01) -> str:
@@ -137,3 +147,25 @@ def test_an_effect_that_only_the_training_reaches_is_undetermined(
         assert found["ranking"][0]["effect"] == "stop_below"
         assert "the training alone asks for the effect" in found["unlike"]
         assert found["wrong_probability"] is None
+
+
+@pytest.mark.parametrize(
+    ("law", "rival", "told"),
+    [
+        pytest.param(soft_stop_below, "stop_below@load", "as little alone", id="of a set"),
+        pytest.param(weak_gap, "jenkins_behind_gap@load", "far less of the training", id="of one"),
+    ],
+)
+def test_a_rarer_effect_like_those_named_is_a_rival_if_it_leaves_less_or_is_simpler(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], law: Law, rival: str, told: str
+) -> None:
+    (tmp_path / "damper.toml").write_text(WITH_OIL)
+    logs = [logged(tmp_path / f"run{seed}.csv", seed, law) for seed in (1, 2)]
+    folder, model = tmp_path / "study", tmp_path / "damper.toml"
+    assert main(["study", "new", f"{folder}", "--data", *logs, "--model", f"{model}"]) == 0
+    capsys.readouterr()
+    assert main(["explain", f"{folder}", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"] == "undetermined"
+    assert found["rivals"] == [rival]
+    assert f"{rival} leaves {told}" in found["text"]
