@@ -11,7 +11,6 @@ from rigwatch.workbench.compare import (
     with_base,
     with_hold_decided,
 )
-from rigwatch.workbench.data import predicts_along_motion
 from rigwatch.workbench.explain.adequacy import (
     cannot_tell,
     closer_base,
@@ -27,7 +26,6 @@ from rigwatch.workbench.explain.adequacy import (
     with_unjudged_told,
 )
 from rigwatch.workbench.explain.changed_parameters import undetermined_if_parameters_changed
-from rigwatch.workbench.explain.contradicting import FAVOURED
 from rigwatch.workbench.explain.credibility import (
     credible_verdict,
     unless_refused,
@@ -37,12 +35,7 @@ from rigwatch.workbench.explain.exchange import Exchange, exchange
 from rigwatch.workbench.explain.explanation import STRENGTH_TOLD, Explanation, explanation
 from rigwatch.workbench.explain.lower_floor import with_lower_floor
 from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
-from rigwatch.workbench.explain.only_training import (
-    SHOWN,
-    no_worse,
-    trains_far_better,
-    undetermined_if_training_asks,
-)
+from rigwatch.workbench.explain.only_training import SHOWN, undetermined_if_training_asks
 from rigwatch.workbench.explain.rough_verdict import (
     leaves_much,
     leaves_some,
@@ -53,6 +46,7 @@ from rigwatch.workbench.explain.rough_verdict import (
 )
 from rigwatch.workbench.explain.sets.like_ports import with_like_ports
 from rigwatch.workbench.explain.sets.pairs import two_effects
+from rigwatch.workbench.explain.sets.rarer_rivals import tries_rarer, with_rarer_rivals
 from rigwatch.workbench.explain.sets.several_effects import may_need_several, several_effects
 from rigwatch.workbench.explain.verdict import Verdict, not_converged
 from rigwatch.workbench.fit import begun_from_larger
@@ -65,8 +59,6 @@ from rigwatch.workbench.ranking import (
     own_floor,
     rank,
     rank_all,
-    refinements,
-    refit,
     suitable,
     with_refinements,
 )
@@ -166,7 +158,13 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
         return _unless_named(first, none)
     text = RARER.format(text=found.text, count=len(rarer))
     unlike = "; ".join([*filter(None, [found.unlike]), SECOND_PASS])
-    doubted = replace(found, text=text, unlike=unlike, wrong_probability=None, wrong_at_most=None)
+    word = found.verdict
+    # Usual effects found nothing to explain: one of many rarer ones is not named with confidence.
+    if told.verdict == "nothing_missing" and word == "missing_effect":
+        word, text = "undetermined", f"likely, not certain: {text}"
+    doubted = replace(
+        found, verdict=word, text=text, unlike=unlike, wrong_probability=None, wrong_at_most=None
+    )
     return replace(second, explanation=doubted)
 
 
@@ -184,9 +182,11 @@ def _asks_for_rarer(found: Explained) -> bool:
 
 
 def _only_training_may_ask(found: Explained) -> bool:
-    """Whether nothing held out is missing in a free run, whatever the training asks for."""
+    """Whether nothing held out is missing at the first step of a free run."""
     told, bench = found.explanation, found.bench
-    if bench.data.along_motion or any(row.accepted for row in found.rows):
+    if bench.data.along_motion or bench.base.placements:
+        return False
+    if any(row.accepted for row in found.rows):
         return False
     at_floor = bench.floor.reached(bench.base.held_out)
     return told.verdict == "nothing_missing" or (told.verdict == "undetermined" and at_floor)
@@ -217,12 +217,6 @@ def _may_replace(first: Explained, row: Ranked) -> bool:
 def _halves(first: Explained, second: Explained) -> bool:
     """Whether what is named leaves at most half the error of what was named before, if any was."""
     return bool(second.explanation.beside) or _may_replace(first, second.rows[0])
-
-
-def tries_rarer(study: Study) -> bool:
-    """Whether rarer effects are tried by themselves where no usual one explains the error."""
-    checked = predicts_along_motion(study) and bool(study.file.healthy)
-    return not (checked or study.model.rough)
 
 
 def _unless_named(found: Explained, more: str) -> Explained:
@@ -346,7 +340,7 @@ def _judged(bench: Bench, rows: list[Ranked], progress: Progress) -> tuple[list[
     elif may_need_several(bench, verdict):
         verdict = several_effects(bench, rows, verdict, progress)
         verdict = with_like_ports(bench, rows, verdict, progress)
-    rows, verdict = _rivalled(bench, rows, verdict, progress)
+    rows, verdict = with_rarer_rivals(bench, rows, verdict, progress)
     verdict = unless_refused(refused, with_motion_sensor(bench, verdict))
     verdict = unless_resampled(bench, verdict)
     if along and bench.study.model.rough:
@@ -397,38 +391,6 @@ def _refined(
     # The coarser effect is named in place of a finer one while other physics is missing.
     best.accepted, best.reason = False, f"leaves much that {finer[0].label} explains"
     return refined, credible_verdict(bench, refined, refused)
-
-
-def _rivalled(
-    bench: Bench, rows: list[Ranked], verdict: Verdict, progress: Progress
-) -> tuple[list[Ranked], Verdict]:
-    """Ranking and verdict, with rarer effects like those named in a free run as rivals.
-
-    What leaves nothing above the quietest band may still be the likeness of a rarer effect, as a
-    leak is of an overflow that opens late, and two effects that of one, as a spring and a stop on
-    both sides are of a stop on one.
-    """
-    best = verdict.best
-    free_run = not bench.data.along_motion and tries_rarer(bench.study)
-    if verdict.word != "missing_effect" or best is None or best.fitted is None or not free_run:
-        return rows, verdict
-    named = [row for row in rows if row.label in (best.label, *verdict.beside)]
-    finer = refinements(bench.study, bench.data, bench.base, rows, named, likened=True)
-    most = max((row.explained for row in named), default=0.0)
-    likely = [r for r in finer if r.p_value < SHOWN and r.explained > FAVOURED * most]
-    for row in likely:
-        progress(f"fitting {row.label}, which the training resembles more than {best.label}")
-        refit(bench.study, bench.data, bench.base, row)
-    leaves_less = no_worse if verdict.beside else trains_far_better
-    better = [row for row in likely if row.accepted and leaves_less(best, row)]
-    if not better:
-        return rows, verdict
-    rivals = tuple(row.label for row in better)
-    lowers = f"{' and '.join((*verdict.beside, best.label))} may be missing, or what is rarer"
-    less = "leaves as little alone" if verdict.beside else "leaves far less of the training"
-    text = f"{lowers} and like that: {', '.join(rivals)} {less}"
-    told_now = replace(verdict, word="undetermined", rivals=(*verdict.rivals, *rivals), text=text)
-    return in_order([*rows, *better]), told_now
 
 
 def _explains_the_rest(bench: Bench, row: Ranked) -> bool:

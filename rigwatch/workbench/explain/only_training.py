@@ -11,7 +11,7 @@ from dataclasses import replace
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.fit import Fitted
-from rigwatch.workbench.ranking import MATERIAL, Ranked, difference, error_ratio
+from rigwatch.workbench.ranking import MATERIAL, Ranked
 from rigwatch.workbench.study import told
 
 SHOWN = 1e-3
@@ -23,8 +23,8 @@ def undetermined_if_training_asks(
 ) -> Verdict:
     """The verdict; `undetermined` if the training asks for an effect where nothing held out does.
 
-    Along a measured motion, and of a rough model, the model's own error does so as well: there the
-    sentence says it, and the word stays.
+    Along a measured motion, of a rough model and once effects are accepted, the model's own error
+    does so as well: a slider has rounded corners. There the sentence says it, and the word stays.
 
     Args:
         bench: the study.
@@ -35,7 +35,7 @@ def undetermined_if_training_asks(
     if verdict.word != "nothing_missing" or row is None:
         return verdict
     text = verdict.text + _in_words(bench.base, row)
-    if bench.data.along_motion or bench.study.model.rough:
+    if bench.data.along_motion or bench.study.model.rough or bench.base.placements:
         return replace(verdict, text=text)
     return Verdict("undetermined", row, (row.label, *row.alike), (), text)
 
@@ -47,27 +47,6 @@ def asked_by_training(base: Fitted, rows: Sequence[Ranked]) -> Ranked | None:
     """
     asked = [row for row in rows if not (row.accepted or row.vague) and _asked_for(base, row)]
     return min(asked, key=_train_error, default=None)
-
-
-def trains_far_better(best: Ranked, row: Ranked) -> bool:
-    """Whether a fit leaves far less of the training than the best's, and less of what is held out.
-
-    Far less is a material fall of the error that is certainly more than chance.
-    """
-    assert best.fitted is not None
-    assert row.fitted is not None
-    trained = difference(best.fitted.train, row.fitted.train)
-    held_out = difference(best.fitted.held_out, row.fitted.held_out)
-    certain = trained.relative > MATERIAL and trained.p_falls < SHOWN
-    return certain and held_out.mean > 0.0
-
-
-def no_worse(best: Ranked, row: Ranked) -> bool:
-    """Whether a fit leaves no more than the best's beside its set, held out and of the training."""
-    assert best.fitted is not None
-    assert row.fitted is not None
-    trained = row.fitted.train_error / best.fitted.train_error
-    return max(trained, error_ratio(best, row)) < 1 + MATERIAL
 
 
 def _asked_for(base: Fitted, row: Ranked) -> bool:

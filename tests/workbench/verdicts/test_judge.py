@@ -107,23 +107,24 @@ def test_nothing_is_missing_where_the_error_is_noise() -> None:
 
 
 @pytest.mark.parametrize(
-    ("after", "p_value", "along", "word", "told"),
+    ("after", "p_value", "along", "later", "word", "told"),
     [
-        pytest.param(1.0, 1e-9, False, "undetermined", True, id="trains"),
-        pytest.param(1.09, 1e-9, False, "nothing_missing", False, id="hardly trains"),
-        pytest.param(1.0, 0.01, False, "nothing_missing", False, id="by chance"),
-        pytest.param(1.0, 1e-9, True, "nothing_missing", True, id="by the model's own error"),
+        pytest.param(1.0, 1e-9, False, False, "undetermined", True, id="trains"),
+        pytest.param(1.09, 1e-9, False, False, "nothing_missing", False, id="hardly trains"),
+        pytest.param(1.0, 0.01, False, False, "nothing_missing", False, id="by chance"),
+        pytest.param(1.0, 1e-9, True, False, "nothing_missing", True, id="along the motion"),
+        pytest.param(1.0, 1e-9, False, True, "nothing_missing", True, id="at a later step"),
     ],
 )
 def test_what_only_the_training_asks_for_is_undetermined_where_nothing_held_out_is_missing(
-    after: float, p_value: float, along: bool, word: str, told: bool
+    after: float, p_value: float, *, along: bool, later: bool, word: str, told: bool
 ) -> None:
     refused = row("leakage@tank", 1.1, accepted=False, alike=("offset@level",))
     assert refused.fitted is not None
     refused.fitted = replace(refused.fitted, train=base(after).train)
     refused.p_value = p_value
     bench: Any = SimpleNamespace(
-        base=base(1.1),
+        base=replace(base(1.1), placements=(refused.placement,) if later else ()),
         data=SimpleNamespace(along_motion=along),
         study=SimpleNamespace(model=SimpleNamespace(rough=False)),
     )
