@@ -27,15 +27,20 @@ VIEWER_PACKAGES := mesa-vulkan-drivers libvulkan1
 BROWSER_PACKAGES := chromium chromium-driver
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test sbom vulnerabilities docs demo bench lint tests-read unit again nightly commissioned demo-headless demo-beside mutate lock viewer-packages clean
+.PHONY: help setup test sbom vulnerabilities docs demo demo-duration bench lint tests-read unit again nightly commissioned demo-headless demo-beside mutate lock viewer-packages clean
 
 help:  ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
 
 setup: $(STAMPS)/dev  ## only the virtual environment, in .venv
 
-demo: $(STAMPS)/run  ## simulated rig, monitor and live dashboard: friction appears, an alarm names it
+demo: demo-duration $(STAMPS)/run  ## simulated rig, monitor and live dashboard: friction appears, an alarm names it
 	@rigwatch demo $(DEMO)
+
+demo-duration:
+	@[ -e $(STAMPS)/run ] || printf 'demo: %s\n' \
+		'the first time it is some three minutes to the first alarm, more on a slow network:' \
+		'the set-up (one to three), a model of the healthy rig (about one), and half a minute of the rig'
 
 SYNC := $(if $(filter output-sync,$(.FEATURES)),--output-sync=target)
 

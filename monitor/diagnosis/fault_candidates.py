@@ -48,6 +48,8 @@ UNSURE = 0.25
 """Share of what the best effect leaves by which others may leave more and be as likely."""
 FEWEST = 64
 """Fewest samples for a ranking."""
+MOST_NAMED, MOST_DESCRIBED = 6, 2
+"""Number of rivals that are named, and up to which the physics of each is told."""
 
 
 @dataclass(frozen=True)
@@ -236,9 +238,12 @@ def _rivals(best: Suspect, rows: Sequence[Suspect]) -> str:
     """What explains the same as the best: other laws of one effect, or other effects as well."""
     if not best.alike:
         return ""
+    rivals = {row.label: row for row in rows if row.label in best.alike}
     kin = {row.label for row in rows if (row.family, row.port) == (best.family, best.port)}
-    named, more = best.alike[:6], len(best.alike) - 6
-    listed = ", ".join(named) + (f" and {more} more" if more > 0 else "")
+    named, more = best.alike[:MOST_NAMED], len(best.alike) - MOST_NAMED
+    few = len(best.alike) <= MOST_DESCRIBED
+    told = [_described(rivals[label]) if few else label for label in named]
+    listed = ", ".join(told) + (f" and {more} more" if more > 0 else "")
     one = len(best.alike) == 1
     verb = "explains" if one else "explain"
     if not best.family or not kin.issuperset(best.alike):
@@ -250,12 +255,16 @@ def _rivals(best: Suspect, rows: Sequence[Suspect]) -> str:
     )
 
 
+def _described(row: Suspect) -> str:
+    """An effect at a port, and its physics in parentheses."""
+    physics = row.physics.strip().rstrip(".")
+    return f"{row.label} ({physics[0].lower()}{physics[1:]})" if physics else row.label
+
+
 def _fit(row: Suspect) -> str:
     """An effect, its physics, and how well it explains the change."""
-    physics = row.physics.strip().rstrip(".")
-    plain = f" ({physics[0].lower()}{physics[1:]})" if physics else ""
     share = f"explains {row.explained:.0%} of the change since healthy"
-    return f"{row.label}{plain}: {share}, by chance {_chance(row.p_value)}"
+    return f"{_described(row)}: {share}, by chance {_chance(row.p_value)}"
 
 
 def _chance(p_value: float) -> str:

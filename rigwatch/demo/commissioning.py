@@ -52,8 +52,9 @@ def ensure_model(config: Path, folder: Path, say: Callable[[str], None]) -> Path
         say(f"model of the healthy rig: {relative(model)}, made before and up to date")
         return model
     say("commissioning: first the monitor learns how the healthy rig moves, as on a real rig:")
-    say("  three recordings, and a model: a file that says how the healthy rig answers its drive")
-    say("  and how far it strays from that; nothing is shown in a browser before that")
+    say("  three recordings, and a model: a file that says which acceleration the healthy rig")
+    say("  answers its drive with, and by how many m/s² the measured one differs without a fault;")
+    say("  nothing is shown in a browser before that")
     say(f"  {STEPS} commands run here by themselves, about a minute in all, more on a busy machine")
     say("  (later runs use the same model)")
     sessions = {role: folder / "commissioning" / f"{role}.mcap" for role in RECORDINGS}

@@ -240,6 +240,8 @@ class Narrator:
         if alarm.name in OF_THE_RIG and not self._told & set(OF_THE_RIG):
             for line in CAUSE_FOLLOWS:
                 self._say(f"            {line}")
+            if self._attended and (address := self._workbench()):
+                self._say(f"            the workbench, to study alarms in a browser: {address}")
         if self._attended and alarm.name != NAMELESS and self._told <= {NAMELESS}:
             self._say(f"            all alarms: $ rigwatch alarms {self._config}")
             self._say("            (an alarm is kept, even once its cause has gone, until somebody")

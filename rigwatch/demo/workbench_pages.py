@@ -34,7 +34,7 @@ def workbench_pages(folder: Path, rig: Path, say: Callable[[str], None]) -> Iter
     Args:
         folder: of the demonstration; the studies are below it.
         rig: its configuration.
-        say: told the address.
+        say: called with lines for people.
     """
     pages = Pages()
     if find_spec("starlette") is None or find_spec("uvicorn") is None:
@@ -42,9 +42,7 @@ def workbench_pages(folder: Path, rig: Path, say: Callable[[str], None]) -> Iter
         return
     studies = folder / "studies"
     studies.mkdir(exist_ok=True)
-    say(
-        "two views follow: first the dashboard, the rig live; then the workbench, to study an alarm"
-    )
+    say("the dashboard follows, the rig live; a second page, the workbench, with the first alarm")
     process = subprocess.Popen(
         [sys.executable, "-m", "rigwatch", "workbench", str(studies), "--rig", str(rig), "--json"],
         stdout=subprocess.PIPE,
@@ -52,7 +50,7 @@ def workbench_pages(folder: Path, rig: Path, say: Callable[[str], None]) -> Iter
         text=True,
         process_group=0,
     )
-    threading.Thread(target=_tell, args=(process, pages, say), name="pages", daemon=True).start()
+    threading.Thread(target=_learn, args=(process, pages), name="pages", daemon=True).start()
     try:
         yield pages
     finally:
@@ -60,9 +58,8 @@ def workbench_pages(folder: Path, rig: Path, say: Callable[[str], None]) -> Iter
         say(f"its studies:   rigwatch workbench {relative(studies)}")
 
 
-def _tell(process: "subprocess.Popen[str]", pages: Pages, say: Callable[[str], None]) -> None:
+def _learn(process: "subprocess.Popen[str]", pages: Pages) -> None:
     assert process.stdout is not None
     line = process.stdout.readline()
     if line:
         pages.address = json.loads(line)["address"]
-        say(f"  workbench: once an alarm has come, open {pages.address} in a browser")

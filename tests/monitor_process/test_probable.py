@@ -128,6 +128,13 @@ def test_rivals_of_one_family_leave_the_kind_of_fault_without_doubt() -> None:
         assert f"{law.label}, {other.label} explain as much in this motion, so check" in in_words(
             [both, law, other]
         )
+    told = replace(law, physics="Friction follows with two lags.")
+    assert "by which law is not: bliman_sorine_2@load (friction follows with two lags), an" in (
+        in_words([replace(best, alike=(law.label,)), told])
+    )
+    many = [replace(told, effect=name) for name in ("dahl", "lugre", "jenkins")]
+    listed = in_words([replace(best, alike=tuple(row.label for row in many)), *many])
+    assert "dahl@load, lugre@load, jenkins@load, other laws of it, explain" in listed
     nameless = replace(law, family="")
     alone = replace(best, family="", alike=(law.label,))
     assert "so check these too" in in_words([alone, nameless]), "no family is none in common"

@@ -159,7 +159,7 @@ def test_a_named_effect_has_its_strength_and_the_command_that_adds_it(study: Stu
 
 def test_what_to_do_next_is_told_where_the_recordings_do_not_decide(study: Study) -> None:
     found = replace(gather(study).explanation, verdict="undetermined", next_experiment=None)
-    best = replace(found.ranking[0], effect="coulomb", port="load")
+    best = replace(found.ranking[0], effect="coulomb", port="load", accepted=True)
     told = next_step(replace(found, ranking=[best]), "rub")
     assert told == (
         "record another motion, list it under [[train]] in rub/study.toml, and explain again; or,"
@@ -167,6 +167,9 @@ def test_what_to_do_next_is_told_where_the_recordings_do_not_decide(study: Study
     )
     beside = next_step(replace(found, ranking=[best], beside=["lag@drive"]), "rub")
     assert beside.endswith("rigwatch add rub coulomb --port load --with lag@drive")
+    only_trained = next_step(replace(found, ranking=[replace(best, accepted=False)]), "rub")
+    assert "list it under [[held_out]] in rub/study.toml" in only_trained
+    assert only_trained.endswith("rigwatch add rub coulomb --port load --anyway")
     named = replace(found, verdict="missing_effect", ranking=[best])
     assert next_step(named, "rub") == next_command(named, "rub")
     assert next_step(replace(found, verdict="nothing_missing"), "rub") == ""

@@ -278,6 +278,11 @@ def test_the_address_of_the_workbench_is_told_where_it_is_needed() -> None:
     narrator = Narrator(
         scenario, said.append, "rig.toml", "studies", known=0.43, workbench=lambda: "http://here"
     )
+    narrator.begin(0)
+    assert not any("http://here" in line for line in said), "no alarm can be studied yet"
+    narrator.alarm(alarm("departure"))
+    narrator.alarm(alarm("dry_friction"))
+    assert sum("to study alarms in a browser: http://here" in line for line in said) == 1
     text = "dry_friction: probably missing: coulomb@load (dry surfaces resist sliding)"
     narrator.explain(Event("monitor", 0, "error", PROBABLY_MISSING, text))
     assert any("at the alarm in the workbench (http://here)," in line for line in said)

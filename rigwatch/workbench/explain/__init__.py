@@ -9,10 +9,10 @@ from rigwatch.workbench.explain.explain import (
     explain,
     explained,
     ranking,
-    tries_rarer,
     with_whole_library,
 )
 from rigwatch.workbench.explain.explanation import Explanation, Row, as_data, explanation
+from rigwatch.workbench.explain.sets.rarer_rivals import tries_rarer
 from rigwatch.workbench.explain.sets.set_gain import SetGain, set_gain
 from rigwatch.workbench.explain.verdict import Verdict, judge
 

@@ -11,7 +11,6 @@ from rigwatch.workbench.compare import (
     with_base,
     with_hold_decided,
 )
-from rigwatch.workbench.data import predicts_along_motion
 from rigwatch.workbench.explain.adequacy import (
     cannot_tell,
     closer_base,
@@ -36,6 +35,7 @@ from rigwatch.workbench.explain.exchange import Exchange, exchange
 from rigwatch.workbench.explain.explanation import STRENGTH_TOLD, Explanation, explanation
 from rigwatch.workbench.explain.lower_floor import with_lower_floor
 from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
+from rigwatch.workbench.explain.only_training import SHOWN, undetermined_if_training_asks
 from rigwatch.workbench.explain.rough_verdict import (
     leaves_much,
     leaves_some,
@@ -46,6 +46,7 @@ from rigwatch.workbench.explain.rough_verdict import (
 )
 from rigwatch.workbench.explain.sets.like_ports import with_like_ports
 from rigwatch.workbench.explain.sets.pairs import two_effects
+from rigwatch.workbench.explain.sets.rarer_rivals import tries_rarer, with_rarer_rivals
 from rigwatch.workbench.explain.sets.several_effects import may_need_several, several_effects
 from rigwatch.workbench.explain.verdict import Verdict, not_converged
 from rigwatch.workbench.fit import begun_from_larger
@@ -148,30 +149,39 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
     An effect that is named although it leaves much may be the likeness of a rarer one, as friction
     is of friction behind a gap. What is found has to leave nothing and, in place of an effect that
     is named, half its error at most. Effects are fitted again only if the score of a rarer one,
-    corrected for the number of all, is more than chance. Where a healthy recording checks a model
-    along its measured motion, rarer ones are tried as refinements already, and fits take long.
+    corrected for the number of all, is more than chance. Where nothing held out is missing, the
+    training must certainly ask for it. Where a healthy recording checks a model along its measured
+    motion, rarer ones are tried as refinements already, and fits take long.
     """
     bench, told = first.bench, first.explanation
     rarer = suitable(bench.study)[1]
-    asked = told.exchange is None and _asks_for_rarer(first)
+    asked = told.exchange is None and (_asks_for_rarer(first) or _only_training_may_ask(first))
     if not (asked and rarer and tries_rarer(bench.study)):
         return first
     wider = with_whole_library(bench.study)
     rows = rank_all(wider, bench.data, bench.base)
-    if not any(row.effect in rarer and row.p_value < BY_CHANCE for row in rows):
+    least = SHOWN if _only_training_may_ask(first) else BY_CHANCE
+    if not any(row.effect in rarer and row.p_value < least for row in rows):
         return _unless_named(first, f"nor is it like one of {len(rarer)} rarer ones")
     progress(f"no usual effect explains the error: trying {len(rarer)} rarer ones")
     rows = rank(wider, bench.data, bench.base, bench.floor, progress, known=first.rows)
     none = f"nor does one of {len(rarer)} rarer ones"
-    if not any(row.effect in rarer and _may_replace(first, row) for row in rows):
+    replaces = _trains_better if _only_training_may_ask(first) else _may_replace
+    if not any(row.effect in rarer and replaces(first, row) for row in rows):
         return _unless_named(first, none)
     second = _explained_once(replace(bench, study=wider), progress, rows)
     found = second.explanation
-    if found.verdict not in STRENGTH_TOLD or found.remains or not _halves(first, second):
+    if found.verdict not in STRENGTH_TOLD or not _is_better(first, second):
         return _unless_named(first, none)
     text = RARER.format(text=found.text, count=len(rarer))
     unlike = "; ".join([*filter(None, [found.unlike]), SECOND_PASS])
-    doubted = replace(found, text=text, unlike=unlike, wrong_probability=None, wrong_at_most=None)
+    word = found.verdict
+    # Usual effects found nothing to explain: one of many rarer ones is not named with confidence.
+    if told.verdict == "nothing_missing" and word == "missing_effect":
+        word, text = "undetermined", f"likely, not certain: {text}"
+    doubted = replace(
+        found, verdict=word, text=text, unlike=unlike, wrong_probability=None, wrong_at_most=None
+    )
     return replace(second, explanation=doubted)
 
 
@@ -188,6 +198,33 @@ def _asks_for_rarer(found: Explained) -> bool:
     return not own_floor(bench.study, bench.data, bench.floor, best).reached(best.fitted.held_out)
 
 
+def _only_training_may_ask(found: Explained) -> bool:
+    """Whether nothing held out is missing at the first step of a free run."""
+    told, bench = found.explanation, found.bench
+    if bench.data.along_motion or bench.base.placements:
+        return False
+    if any(row.accepted for row in found.rows):
+        return False
+    at_floor = bench.floor.reached(bench.base.held_out)
+    return told.verdict == "nothing_missing" or (told.verdict == "undetermined" and at_floor)
+
+
+def _is_better(first: Explained, second: Explained) -> bool:
+    """Whether the explanation by all effects is to be told in place of that by the usual ones."""
+    if _only_training_may_ask(first):
+        return _trains_better(first, second.rows[0])
+    return not second.explanation.remains and _halves(first, second)
+
+
+def _trains_better(first: Explained, row: Ranked) -> bool:
+    """Whether the training certainly asks for an effect, more than for what was named before."""
+    named = first.explanation.verdict in STRENGTH_TOLD
+    before = first.rows[0].fitted if named else first.bench.base
+    if before is None or row.fitted is None or row.p_value >= SHOWN:
+        return False
+    return row.fitted.train_error < (1 - MATERIAL) * before.train_error
+
+
 def _may_replace(first: Explained, row: Ranked) -> bool:
     """Whether an effect leaves at most half the error of what was named before, if any was."""
     named = first.explanation.verdict in STRENGTH_TOLD
@@ -197,12 +234,6 @@ def _may_replace(first: Explained, row: Ranked) -> bool:
 def _halves(first: Explained, second: Explained) -> bool:
     """Whether what is named leaves at most half the error of what was named before, if any was."""
     return bool(second.explanation.beside) or _may_replace(first, second.rows[0])
-
-
-def tries_rarer(study: Study) -> bool:
-    """Whether rarer effects are tried by themselves where no usual one explains the error."""
-    checked = predicts_along_motion(study) and bool(study.file.healthy)
-    return not (checked or study.model.rough)
 
 
 def _unless_named(found: Explained, more: str) -> Explained:
@@ -326,6 +357,7 @@ def _judged(bench: Bench, rows: list[Ranked], progress: Progress) -> tuple[list[
     elif may_need_several(bench, verdict):
         verdict = several_effects(bench, rows, verdict, progress)
         verdict = with_like_ports(bench, rows, verdict, progress)
+    rows, verdict = with_rarer_rivals(bench, rows, verdict, progress)
     verdict = unless_refused(refused, with_motion_sensor(bench, verdict))
     verdict = unless_resampled(bench, verdict)
     if along and bench.study.model.rough:
@@ -335,7 +367,7 @@ def _judged(bench: Bench, rows: list[Ranked], progress: Progress) -> tuple[list[
         verdict = undetermined_if_little_and_unexplained(bench.base, bench.floor, verdict)
         verdict = undetermined_if_parameters_changed(bench, verdict, progress)
     verdict = cannot_tell(bench, rows, verdict)
-    verdict = stopped_by_outliers(bench, verdict)
+    verdict = undetermined_if_training_asks(bench, rows, stopped_by_outliers(bench, verdict))
     verdict = with_base_offered(bench, unchecked(bench, verdict))
     verdict = with_unjudged_told(bench, with_change_told(bench.study, verdict))
     if verdict.best is not None:

@@ -168,6 +168,8 @@ def _unlike_training(bench: Bench, verdict: Verdict) -> list[str]:
     best = verdict.best if verdict.word in STRENGTH_TOLD else None
     if best is None or best.fitted is None or verdict.beside or verdict.second:
         return []
+    if bench.floor.reached(bench.base.held_out) and not best.accepted:
+        return ["the training alone asks for the effect"]
     if not shows_little_of_it(bench.base, best, bench.floor):
         return []
     share = remaining_share(bench.base, best, bench.floor)

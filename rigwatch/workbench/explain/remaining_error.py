@@ -8,8 +8,7 @@ from collections.abc import Sequence
 
 from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.fit import Fitted
-from rigwatch.workbench.ranking import EXPLAINED, MATERIAL, Ranked, left_over
-from rigwatch.workbench.study import told
+from rigwatch.workbench.ranking import EXPLAINED, Ranked, left_over
 
 LITTLE = 1 / 3
 """Share of the energy above the quiet band that the missing effect must explain; one of three
@@ -19,8 +18,6 @@ LITTLE_BESIDE = 1 / 2
 two that are left explains that much."""
 LITTLE_IN_TRAINING = LITTLE / 2
 """The same of the training, which excites a missing effect about as much as what is held out."""
-SHOWN = 1e-3
-"""p-value, corrected for the number of candidates, of an effect that training certainly shows."""
 MENTIONED = 3
 """Number of further accepted effects that are listed."""
 
@@ -104,33 +101,6 @@ def _remaining_in_training(base: Fitted, row: Ranked, floor: NoiseFloor) -> floa
         return 0.0
     share = floor.left_over(base.train, row.fitted.train)
     return share if share > 1 - EXPLAINED else 0.0
-
-
-def shown_in_training(base: Fitted, rows: Sequence[Ranked]) -> str:
-    """The effect that the training asks for although nothing held out does, in words; or nothing.
-
-    The recordings held out may not move the machine so that it shows, as a level that stays below
-    the overflow of a tank.
-    """
-    asked = [
-        (row.fitted.train_error, row)
-        for row in rows
-        if row.fitted is not None
-        and not row.accepted
-        and row.p_value < SHOWN
-        and row.fitted.train_error < (1 - MATERIAL) * base.train_error
-        and row.held_out_error > (1 - MATERIAL) * base.held_out_error
-    ]
-    if not asked:
-        return ""
-    least, row = min(asked, key=lambda each: each[0])
-    assert row.fitted is not None
-    before, after = (told(error, base.told_in) for error in (base.train_error, least))
-    change = f"{before:.3g} to {after:.3g} {base.told_in}"
-    return (
-        f"; but {row.label} lowers the error of the training from {change}, which the recordings"
-        " held out hardly show: hold out one that moves the machine as the training does"
-    )
 
 
 def other_accepted(rows: Sequence[Ranked], named: Sequence[str]) -> str:

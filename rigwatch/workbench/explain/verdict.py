@@ -37,7 +37,6 @@ from rigwatch.workbench.explain.remaining_error import (
     hardly_trains,
     other_accepted,
     remaining_error,
-    shown_in_training,
 )
 from rigwatch.workbench.explain.verdict_calibration import CLEAR, Evidence, probability_wrong
 from rigwatch.workbench.fit import Fitted
@@ -233,7 +232,7 @@ def _nothing_found(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> V
     ratio = floor.ratio(base.held_out)
     text = f"the held-out error is {ratio:.2f} times the noise floor, and no effect lowers it"
     if floor.reached(base.held_out):
-        return Verdict("nothing_missing", None, (), (), text + shown_in_training(base, rows))
+        return Verdict("nothing_missing", None, (), (), text)
     noise = _like_noise(rows, floor)
     # With effects in the model, a little above the least that the noise can be tells nothing.
     if base.placements and noise and ratio < NEAR:

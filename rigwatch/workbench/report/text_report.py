@@ -199,9 +199,10 @@ def next_step(found: Explanation, study: str) -> str:
         return next_command(found, study)
     best = found.ranking[0]
     what = "record that experiment" if found.next_experiment else "record another motion"
+    use, anyway = ("train", "") if best.accepted or found.beside else ("held_out", " --anyway")
     return (
-        f"{what}, list it under [[train]] in {study}/{FILE}, and explain again; or, if you know"
-        f" that it is {best.effect}@{best.port}: {_adding(found, study)}"
+        f"{what}, list it under [[{use}]] in {study}/{FILE}, and explain again; or, if you know"
+        f" that it is {best.effect}@{best.port}: {_adding(found, study)}{anyway}"
     )
 
 

@@ -1,5 +1,6 @@
 """A new study says how many effects are tried, and an unknown one how the others are."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -25,9 +26,19 @@ def stop_below(x: np.ndarray, v: np.ndarray) -> np.ndarray:
     return 60 * np.minimum(x + 0.011, 0.0)
 
 
+def soft_stop_below(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """A soft stop on one side, which a stop on both sides and a bent spring make up together."""
+    return 2 * np.minimum(x + 0.011, 0.0)
+
+
 def binding(x: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Dry friction at one place of the stroke."""
     return 0.2 * np.tanh(v / 0.002) * np.exp(-(((x - 0.008) / 0.002) ** 2))
+
+
+def nothing(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """No force besides the damper's."""
+    return np.zeros(len(x))
 
 
 def behind_gap(x: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -39,11 +50,16 @@ def behind_gap(x: np.ndarray, v: np.ndarray) -> np.ndarray:
     return force
 
 
-def logged(path: Path, seed: int, law: Law | None = None) -> str:
+def weak_gap(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """The same slider, so weak that one without a gap leaves little more than noise."""
+    return 0.01 * behind_gap(x, v)
+
+
+def logged(path: Path, seed: int, law: Law | None = None, stroke: float = 0.01) -> str:
     """A damper with a force by a law, or one that something else pushes at random, slowly."""
     draws = np.random.default_rng(seed).normal(size=(2, 1500))
     t = np.arange(1500) / 100
-    x = 0.01 * (np.sin((2 + 0.3 * seed) * t) + np.sin(3.3 * t + 0.05 * t**2 + seed))
+    x = stroke * (np.sin((2 + 0.3 * seed) * t) + np.sin(3.3 * t + 0.05 * t**2 + seed))
     v = np.gradient(x, 0.01)
     hidden = scipy.signal.lfilter([0.1], [1, -0.9], draws[0]) if law is None else law(x, v)
     force = 3 * v + hidden + (0.01 if law is None else 0.004) * draws[1]
@@ -101,3 +117,55 @@ def test_a_rarer_effect_is_named_in_a_second_pass(
     assert f"it was found among {rarer} rarer effects, as no usual one explains the error" in out
     assert "the probability of being wrong is unknown: the effect was found in a second" in out
     assert f"next: rigwatch add {folder} {name} --port load" in out
+
+
+@pytest.mark.parametrize(
+    ("law", "word", "told"),
+    [
+        pytest.param(
+            stop_below, "undetermined", "but stop_below@load", id="hidden in the training"
+        ),
+        pytest.param(nothing, "nothing_missing", "and no effect lowers it", id="nothing hidden"),
+    ],
+)
+def test_an_effect_that_only_the_training_reaches_is_undetermined(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], law: Law, word: str, told: str
+) -> None:
+    (tmp_path / "damper.toml").write_text(WITH_OIL)
+    logs = [
+        logged(tmp_path / f"run{seed}.csv", seed, law, stroke)
+        for seed, stroke in ((1, 0.01), (2, 0.005))
+    ]
+    folder, model = tmp_path / "study", tmp_path / "damper.toml"
+    assert main(["study", "new", f"{folder}", "--data", *logs, "--model", f"{model}"]) == 0
+    capsys.readouterr()
+    assert main(["explain", f"{folder}", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"] == word
+    assert told in found["text"]
+    if word == "undetermined":
+        assert found["ranking"][0]["effect"] == "stop_below"
+        assert "the training alone asks for the effect" in found["unlike"]
+        assert found["wrong_probability"] is None
+
+
+@pytest.mark.parametrize(
+    ("law", "rival", "told"),
+    [
+        pytest.param(soft_stop_below, "stop_below@load", "as little alone", id="of a set"),
+        pytest.param(weak_gap, "jenkins_behind_gap@load", "far less of the training", id="of one"),
+    ],
+)
+def test_a_rarer_effect_like_those_named_is_a_rival_if_it_leaves_less_or_is_simpler(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], law: Law, rival: str, told: str
+) -> None:
+    (tmp_path / "damper.toml").write_text(WITH_OIL)
+    logs = [logged(tmp_path / f"run{seed}.csv", seed, law) for seed in (1, 2)]
+    folder, model = tmp_path / "study", tmp_path / "damper.toml"
+    assert main(["study", "new", f"{folder}", "--data", *logs, "--model", f"{model}"]) == 0
+    capsys.readouterr()
+    assert main(["explain", f"{folder}", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"] == "undetermined"
+    assert found["rivals"] == [rival]
+    assert f"{rival} leaves {told}" in found["text"]

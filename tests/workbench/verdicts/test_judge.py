@@ -14,6 +14,7 @@ from rigwatch.workbench.data import RESAMPLED, NoiseFloor
 from rigwatch.workbench.explain.contradicting import explaining_all, leaves_less_of_all
 from rigwatch.workbench.explain.credibility import unless_resampled
 from rigwatch.workbench.explain.indistinguishable import undistinguished
+from rigwatch.workbench.explain.only_training import undetermined_if_training_asks
 from rigwatch.workbench.explain.remaining_error import remaining_share
 from rigwatch.workbench.explain.sets.combination import Combination
 from rigwatch.workbench.explain.sets.several_effects import (
@@ -106,23 +107,34 @@ def test_nothing_is_missing_where_the_error_is_noise() -> None:
 
 
 @pytest.mark.parametrize(
-    ("after", "p_value", "told"),
+    ("after", "p_value", "along", "later", "word", "told"),
     [
-        pytest.param(1.0, 1e-9, True, id="trains"),
-        pytest.param(1.09, 1e-9, False, id="hardly trains"),
-        pytest.param(1.0, 0.01, False, id="by chance"),
+        pytest.param(1.0, 1e-9, False, False, "undetermined", True, id="trains"),
+        pytest.param(1.09, 1e-9, False, False, "nothing_missing", False, id="hardly trains"),
+        pytest.param(1.0, 0.01, False, False, "nothing_missing", False, id="by chance"),
+        pytest.param(1.0, 1e-9, True, False, "nothing_missing", True, id="along the motion"),
+        pytest.param(1.0, 1e-9, False, True, "nothing_missing", True, id="at a later step"),
     ],
 )
-def test_what_only_the_training_asks_for_is_told_where_nothing_held_out_is_missing(
-    after: float, p_value: float, told: bool
+def test_what_only_the_training_asks_for_is_undetermined_where_nothing_held_out_is_missing(
+    after: float, p_value: float, *, along: bool, later: bool, word: str, told: bool
 ) -> None:
-    refused = row("leakage@tank", 1.1, accepted=False)
+    refused = row("leakage@tank", 1.1, accepted=False, alike=("offset@level",))
     assert refused.fitted is not None
     refused.fitted = replace(refused.fitted, train=base(after).train)
     refused.p_value = p_value
-    found = judge(base(1.1), [refused], PERIODS)
-    assert found.word == "nothing_missing"
-    asked = "but leakage@tank lowers the error of the training from 1.1 to 1 N"
+    bench: Any = SimpleNamespace(
+        base=replace(base(1.1), placements=(refused.placement,) if later else ()),
+        data=SimpleNamespace(along_motion=along),
+        study=SimpleNamespace(model=SimpleNamespace(rough=False)),
+    )
+    held_out = judge(bench.base, [refused], PERIODS)
+    assert held_out.word == "nothing_missing"
+    found = undetermined_if_training_asks(bench, [refused], held_out)
+    assert found.word == word
+    named = ("leakage@tank", "offset@level") if word == "undetermined" else ()
+    assert found.members == named
+    asked = "but leakage@tank (or offset@level) lowers the error of the training from 1.1 to 1 N"
     assert (asked in found.text) == told
 
 
