@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rigwatch.workbench.compare.preparation import Bench, open_bench
+from rigwatch.workbench.explain import explain
 from rigwatch.workbench.ranking.candidates import candidates
 from rigwatch.workbench.ranking.scoring import rank_only
 from rigwatch.workbench.study.study_file import Accepted
@@ -82,3 +83,32 @@ def test_the_score_begins_each_recording_anew(tmp_path: Path) -> None:
 def _explained(bench: Bench) -> float:
     found = [c for c in candidates(bench.study, bench.data.train) if c.name == "jenkins"]
     return rank_only(bench.study, bench.data, bench.base, found).explained
+
+
+def late(seed: int, lag: float) -> dict[str, np.ndarray]:
+    """A damper whose load cell follows its force with a lag [s]."""
+    t = np.arange(12_000) / 1000
+    phases = np.random.default_rng(seed).uniform(0, 6, 4)
+    rates = 2 * np.pi * np.array([0.4, 1.1, 2.3, 4.1])
+    v = (0.02 * np.sqrt(rates) * np.cos(np.outer(t, rates) + phases)).sum(axis=1)
+    x, told = np.cumsum(v) / 1000, np.zeros(len(t))
+    for i in range(1, len(t)):
+        told[i] = told[i - 1] + (3.0 * v[i - 1] + 40.0 * x[i - 1] - told[i - 1]) * 1e-3 / lag
+    noise = 0.01 * np.random.default_rng(seed + 9).standard_normal(1200)
+    return {"x": x[::10], "v": v[::10], "force": told[::10] + noise}
+
+
+def test_a_load_cell_that_is_late_is_named_beside_a_model_without_states(tmp_path: Path) -> None:
+    cell = DAMPER.replace("c*v - load", "c*v + k*x - load").replace(
+        'N*s/m" }', 'N*s/m" }\nparameters.k = { value = 20.0, unit = "N/m" }'
+    )
+    cell += '[ports.cell]\nkind = "sensor"\nsignal = "force"\n'
+    study = studied(tmp_path, cell, [late(1, 0.02), late(2, 0.02)], [late(3, 0.02)], UNITS)
+
+    found = explain(study)
+
+    assert found.verdict == "missing_effect"
+    best = found.ranking[0]
+    assert "lag@cell" in {f"{best.effect}@{best.port}", *best.class_}
+    lag = next(row for row in found.ranking if row.effect == "lag")
+    assert lag.parameters["tau"].value == pytest.approx(0.02, rel=0.05)

@@ -14,8 +14,6 @@ def suits(effect: Effect, port: Port, model: Model) -> bool:
     """Whether the effect is compatible with the port and the port has all its variables."""
     if not effect.fits(port.kind) or effect.family in port.described:
         return False
-    if effect.states and port.kind != "force" and not model.states:
-        return False
     if effect.sampled and port.kind == "actuator" and hold_at(model, port) != "zero":
         return False
     if port.passive and not _named(effect) & set(port.variables):
