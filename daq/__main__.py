@@ -48,7 +48,7 @@ class Chain:
         self.device = Supervisor(adapter)
         self.acquisition = Acquisition(config, adapter.clock_rate)
         self._publisher = Publisher(bus, SampleRing(bus, config.daq.ring))
-        self._adapter, self._pulse = adapter, pulse
+        self._adapter, self._pulse, self._bus = adapter, pulse, bus
         self._known = _checked(config, adapter, self.acquisition.source)
         self._desk = DeviceDesk(bus, self._known, config.bus.security) if self._known else None
 
@@ -60,6 +60,7 @@ class Chain:
         if self._known and self._desk:
             self._publisher.publish(self._known.events())
             counters = {**counters, **self._desk.counters}
+        counters = {**counters, "questions_refused": float(self._bus.questions_refused)}
         self._publisher.publish(self.acquisition.tick(time.monotonic_ns(), link, counters))
         self._pulse.advance(self.acquisition.samples, _waits(link, self.acquisition.watch.state))
 

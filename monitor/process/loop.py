@@ -399,6 +399,7 @@ class MonitorProcess:
             "rejected": float(self.reader.rejected),
             "dropped": float(self.reader.dropped),
             **self._operators.counters,
+            "questions_refused": float(self.bus.questions_refused),
             **{f"rejected_of_{who}": float(n) for who, n in self.reader.rejected_by.items()},
         }
         self.bus.publish(

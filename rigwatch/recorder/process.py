@@ -167,6 +167,7 @@ class Recorder:
             "refused_messages": float(self.feed.refused),
             "foreign_samples": float(self.feed.foreign_samples),
             "foreign_messages": float(self.feed.foreign),
+            "questions_refused": float(self._bus.questions_refused),
             "foreign_gaps": float(self.feed.foreign_gaps),
             "segments": float(self.store.segment_count),
             "ages_behind_days": self._ages.lag_s / DAY,

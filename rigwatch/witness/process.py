@@ -158,6 +158,7 @@ class Witness:
             "lost_alarms": float(self._alarms.lost),
             "commands_refused": float(self._check.refused),
             "commands_lost": float(lost),
+            "questions_refused": float(self._bus.questions_refused),
             **self._announcer.counters,
             **self._outputs.counters,
         }

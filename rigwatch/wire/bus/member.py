@@ -33,6 +33,9 @@ class Member:
         ring_bytes: memory of the ring of each numbered topic [bytes].
         lease: silence after which a link counts as broken: the tokens of a process may outlive it
             by as much [s].
+
+    Attributes:
+        questions_refused: queries without an answer, as they were none that is asked here.
     """
 
     def __init__(
@@ -50,6 +53,7 @@ class Member:
         self.rig = rig
         self.process = process
         self.lease = lease
+        self.questions_refused = 0
         self._ring_bytes = ring_bytes
         self._outlet: Outlet | None = None
         self._lock = threading.Lock()
@@ -97,13 +101,26 @@ class Member:
         with self._lock:
             if self._outlet is None:
                 self._outlet = Outlet(
-                    self.transport, self.rig, self.process, self._ring_bytes, kept
-                )
+                    self.transport, self.rig, self.process, self._ring_bytes, kept,
+                    counted=self._counted,
+                )  # fmt: skip
             return self._outlet
 
     def serve(self, key: str, answer: Answer) -> Close:
         """Answer queries to `key` of this rig, in another thread; an error there gives no reply."""
-        return self.transport.serve(self.key(key), answer)
+        return self.transport.serve(self.key(key), self._counted(answer))
+
+    def _counted(self, answer: Answer) -> Answer:
+        """The same answers; questions that end in an error are counted."""
+
+        def counting(question: bytes) -> list[bytes]:
+            try:
+                return answer(question)
+            except Exception:
+                self.questions_refused += 1
+                raise
+
+        return counting
 
     def query(self, key: str, question: bytes = b"", timeout: float = 1.0) -> list[bytes]:
         """Replies of all processes that serve `key` of this rig; none if there are none."""

@@ -12,7 +12,7 @@ import struct
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -21,7 +21,7 @@ import zstandard
 from rigwatch.wire.bus.kept_messages import KeptMessages
 from rigwatch.wire.bus.slabs import Slabs
 from rigwatch.wire.bus.tokens import NamedToken
-from rigwatch.wire.bus.transport import MAX_PAYLOAD, Transport, send
+from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Transport, send
 from rigwatch.wire.messages import ALARMS, TOPICS, Topic, bus_key
 from rigwatch.wire.ordering import UNKNOWN, Ask, Numbered, PastRuns, RingReply, first_fitting
 
@@ -133,6 +133,10 @@ class MessageRing:
                 beside += pack.size if pack.first >= first else 0
 
 
+def _as_it_is(answer: Answer) -> Answer:
+    return answer
+
+
 def capacity_of(topic: Topic, ring_bytes: int) -> int:
     """Capacity of a topic's ring [bytes]."""
     return ring_bytes if topic.rate_hz else min(ring_bytes, RARE_BYTES)
@@ -146,6 +150,7 @@ class Outlet:
         rig, process: of the sender.
         ring_bytes: capacity of each topic's ring [bytes], of rare messages at most `RARE_BYTES`.
         kept: file of the alarms that are sent, None for none; it answers for earlier runs.
+        counted: given what answers the queries of a topic, counts those that are none.
     """
 
     def __init__(
@@ -155,9 +160,11 @@ class Outlet:
         process: str,
         ring_bytes: int = RING_BYTES,
         kept: KeptMessages | None = None,
+        *,
+        counted: Callable[[Answer], Answer] = _as_it_is,
     ) -> None:
         self.run = 1 + secrets.randbits(52)
-        self._kept = kept
+        self._kept, self._counted = kept, counted
         self._transport = transport
         self._rig, self._process = rig, process
         self._rings = {
@@ -181,7 +188,7 @@ class Outlet:
             answers = past if past is not None and ask.boot != self.run else ring
             return [answers.reply(ask).to_bytes()]
 
-        self._transport.serve(key, answer)
+        self._transport.serve(key, self._counted(answer))
 
     def put(self, topic: Topic, payload: bytes) -> None:
         """Store a message, then send it."""

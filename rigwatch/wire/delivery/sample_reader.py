@@ -258,7 +258,7 @@ class SampleReader:
 
     def _refuse(self, block: SampleBlock, sender: str) -> None:
         """Refuse samples of a boot that another process owns, if that was ever heard."""
-        self.counters.foreign += len(block)
+        self.counters.foreign += max(1, len(block))  # one without samples is an attempt, too
         self._refused = block.boot, sender
         if self._owners.is_doubtful(block.boot, sender) and self._unsure.lasts(block.boot):
             self._unsure.end()
