@@ -20,7 +20,9 @@ from rigwatch.wire.errors import DeviceError, ModbusError
 
 _FAILURES = 3
 _MARGIN = 8
-"""Slots about to be overwritten, which are not read."""
+"""Slots about to be overwritten, which are not read: twice as many after a poll of a full ring that
+found them overwritten, as a device takes on samples while it is asked.
+"""
 _U32 = 1 << 32
 
 
@@ -95,6 +97,7 @@ class ModbusAdapter:
         self._next_seq = 0
         self._failed = 0
         self._backwards = 0
+        self._margin, self._full = _MARGIN, False
         self._counts = Counter({"polls": 0, "failed_polls": 0})
         self.trouble = ""
 
@@ -135,7 +138,7 @@ class ModbusAdapter:
         except (ModbusError, DeviceError) as error:
             self._fail(error, has_read=bool(blocks))
         else:
-            self._failed = 0
+            self._failed, self._margin = 0, _MARGIN
         return blocks
 
     def close(self) -> None:
@@ -157,6 +160,8 @@ class ModbusAdapter:
         self._failed = 0 if has_read else self._failed + 1
         if has_read:
             return
+        if self._full:
+            self._margin *= 2
         if isinstance(error, RefusedError | DeviceError):
             raise error
         if self._failed >= _FAILURES:
@@ -196,7 +201,8 @@ class ModbusAdapter:
                 raise ModbusError("the device's count went back: a late reply, or a new count")
             new = header.samples
         self._backwards = 0
-        readable = max(header.slots - _MARGIN, 1)
+        readable = max(header.slots - min(self._margin, header.slots // 2), 1)
+        self._full = new > readable
         new = min(new, readable)
         self._next_seq = (header.samples - new) % _U32
         return new

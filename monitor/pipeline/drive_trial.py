@@ -49,7 +49,7 @@ class DriveTrial:
 
     def __init__(self, model: RigModel) -> None:
         self._accepted = DRIVE in model.accepted_wiring
-        self._length = round(WINDOW * model.sample_rate)
+        self._length = max(1, round(WINDOW * model.sample_rate))
         self._longest, self._pause = (round(s * model.sample_rate) for s in (LONGEST, PAUSE))
         self._tried = [_Tried(factor, model, self._length) for factor in FACTORS]
         self._own = _Windows(self._length)

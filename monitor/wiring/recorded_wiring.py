@@ -35,7 +35,7 @@ def recorded_wiring(recording: Recording) -> tuple[Wiring, str] | None:
 def _ratios(recording: Recording, position: str, acceleration: str) -> list[MotionRatio]:
     """One of each second with motion."""
     x, a, rate = recording.channel(position), recording.channel(acceleration), recording.sample_rate
-    length = round(WINDOW * rate)
+    length = max(1, round(WINDOW * rate))
     starts = range(0, len(x) - length + 1, length)
     windows = (slice(start, start + length) for start in starts)
     found = (motion_ratio(x[window], a[window], rate) for window in windows)

@@ -55,7 +55,7 @@ class WiringCheck:
         self._drive = ModelledDrive(model) if compared else None
         self._noise = model.noise.residual
         self._accepted = frozenset[str](model.accepted_wiring)
-        self._length = round(WINDOW * model.sample_rate)
+        self._length = max(1, round(WINDOW * model.sample_rate))
         self._boot = self._next = -1
         self._restart()
 

@@ -47,7 +47,9 @@ class Catalogue:
         about = {"session": row["session"], "rig": row.get("rig")}
         self.alarms += [about | _timed(alarm) for alarm in row.pop("alarm_rows", ())]
         self.losses += [about | _timed(loss) for loss in row.pop("loss_rows", ())]
-        row["start"], row["end"] = _microseconds(row, "start_ns"), _microseconds(row, "end_ns")
+        start, row["end"] = _microseconds(row, "start_ns"), _microseconds(row, "end_ns")
+        # A log without a date begins at 0; where nothing was recorded, both are 0.
+        row["start"] = 0 if start is None and row["end"] is not None else start
         self.sessions[row["session"]] = row
 
     def mark_copies(self) -> None:

@@ -107,6 +107,17 @@ def test_a_log_that_was_imported_without_a_date_stays_and_is_told(archive, capsy
     assert "1 sessions stay that do not tell when they were recorded" in capsys.readouterr().out
 
 
+def test_a_log_without_a_date_is_among_the_rigs(archive, capsys):
+    source = archive.parent / "log.csv"
+    source.write_text("t,u\n" + "".join(f"{k},{k % 2}\n" for k in range(40)))
+    mapping = ["--time", "t[s]", "--map", "voltage=u[V]", "--rig", "undated"]
+    assert main(["import", str(source), str(archive / "log.mcap"), *mapping]) == 0
+    index(Store(str(archive)))
+    capsys.readouterr()
+    assert main(["archive", "query", str(archive), "rigs"]) == 0
+    assert "undated" in capsys.readouterr().out
+
+
 def test_without_a_limit_or_an_index_nothing_begins(tmp_path, capsys):
     assert main(["archive", "retain", str(tmp_path)]) == 2
     assert "expected --keep-days" in capsys.readouterr().err

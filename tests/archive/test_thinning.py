@@ -10,6 +10,7 @@ from rigwatch.archive import Store, index, query, retain
 from rigwatch.commands import main
 from rigwatch.wire.errors import ArchiveError
 from rigwatch.wire.messages import Column, SampleBlock
+from rigwatch.wire.messages.quality_flags import RESAMPLED, STALE
 from rigwatch.wire.rig_config import RecorderSection
 from rigwatch.wire.session import SessionWriter, run_info
 from tests.archive.sessions import EPOCH_S, write_session
@@ -80,7 +81,8 @@ def test_what_was_interrupted_before_the_files_went_is_finished(
 def test_flagged_values_do_not_count(tmp_path: Path) -> None:
     t_ns = np.int64(EPOCH_S * 1e9) + np.arange(16) * 62_500_000
     values, quality = np.arange(16.0), np.zeros(16, np.uint8)
-    values[5], quality[5] = 1e9, 1
+    values[5], quality[5] = 1e9, STALE
+    quality[6:] = RESAMPLED  # a remark, not a defect
     column = (Column("position", "m", values, quality),)
     with SessionWriter(tmp_path / "a.mcap", run_info("b", 16.0, t_ns=int(t_ns[0]))) as writer:
         writer.write(SampleBlock("rig", 1, 0, t_ns // 1000, t_ns, column))

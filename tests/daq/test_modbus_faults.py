@@ -279,6 +279,43 @@ class Slots(Still):
         return [word for seq in slots for word in encode_slot(seq, seq * 3906, [seq, 0, 0])]
 
 
+class Busy(Slots):
+    """A ring whose device takes so many samples while it is asked once."""
+
+    def __init__(self, samples: int) -> None:
+        super().__init__()
+        self.every = samples
+
+    def read(self, address: int, count: int) -> list[int]:
+        slots = self.header.slots
+        self.header = replace(self.header, samples=self.header.samples + self.every)
+        if address == 0:
+            return Still.read(self, address, count)
+        first = (address - self.header.address(0)) // self.header.slot_length
+        newest = self.header.samples - 1
+        seqs = [
+            newest - (newest - slot) % slots
+            for slot in range(first, first + count // self.header.slot_length)
+        ]
+        return [word for seq in seqs for word in encode_slot(seq, seq * 3906, [seq, 0, 0])]
+
+
+@pytest.mark.parametrize("every", [4, 10, 12])
+def test_a_full_ring_is_read_of_a_device_that_goes_on_while_it_is_asked(every: int) -> None:
+    registers = Busy(every)
+    adapter = ModbusAdapter(registers, channels=3, sleep=lambda seconds: None, polls=1e6)
+    adapter.open()
+    adapter.read(1.0)
+    registers.header = replace(registers.header, samples=registers.header.samples + 5000)
+    read: list[int] = []
+    for _ in range(20):
+        with contextlib.suppress(DeviceError):
+            read += [int(seq) for block in adapter.read(1.0) for seq in block.seq]
+    assert read
+    assert read == list(range(read[0], read[-1] + 1))
+    assert registers.header.samples - read[-1] < 100
+
+
 @pytest.mark.parametrize("error", [ModbusError("late"), RefusedError("no"), DeviceError("gone")])
 def test_a_poll_that_fails_halfway_loses_nothing_of_what_it_has_read(error: Exception) -> None:
     registers = Slots()

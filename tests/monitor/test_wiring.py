@@ -9,6 +9,7 @@ from msgspec import structs
 from monitor.model.model_file import RigModel, model_text, parse_model
 from monitor.pipeline.rig_monitor import RigMonitor
 from monitor.wiring.motion_ratio import motion_ratio
+from monitor.wiring.wiring_check import WiringCheck
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.messages.message_types import Alarm, EstimateBlock
 from rigwatch.wire.rig_config import AlarmSection
@@ -254,3 +255,10 @@ def test_the_models_word_is_kept_in_its_file() -> None:
     broken = model_text(model).replace("wiring_swapped", "wiring_any")
     with pytest.raises(ConfigError, match="accepted_wiring"):
         parse_model(broken, "broken")
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_rig_of_a_sample_in_two_seconds_is_not_checked(scheme: str) -> None:
+    slow = structs.replace(SCHEMES[scheme](), sample_rate=0.5)
+    found = WiringCheck(slow).update(block(run(SINE, 1.0), 0, 16))
+    assert not found[1]

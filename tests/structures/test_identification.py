@@ -3,6 +3,7 @@ import pytest
 
 from rigwatch.structures.identification.identify import METHODS, identify
 from rigwatch.structures.identification.problem import problem_of
+from rigwatch.structures.identification.shooting import cheapest
 from rigwatch.structures.records.record import Record
 from rigwatch.wire.errors import ModelError
 from sim_plant.structure import simulate, with_noise
@@ -188,3 +189,8 @@ def test_heavy_noise_on_every_signal_is_not_taken_for_a_trajectory_that_parts():
     found = identify("shooting", antenna(), Record(0.01, made.columns))
     assert found.converged
     np.testing.assert_allclose(found.iterations[-1][:2], [100.0, 1000.0], rtol=0.02)
+
+
+def test_windows_that_diverged_are_never_the_best() -> None:
+    assert cheapest([float("nan"), 3.0, 1.0, float("inf")]) == 2
+    assert cheapest([float("inf"), float("nan"), 3.0]) == 2

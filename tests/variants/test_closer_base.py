@@ -67,7 +67,7 @@ def test_two_effects_at_once_are_told_on_its_own_base_and_undetermined_on_anothe
     elsewhere = unless_two(two)
     assert elsewhere.verdict == "undetermined"
     assert (elsewhere.also, elsewhere.ranking) == (two.also, two.ranking)
-    assert elsewhere.text.startswith(two.text)
+    assert elsewhere.text.startswith(f"likely, not certain: {two.text}; two effects at once")
     assert elsewhere.wrong_probability is None
 
 

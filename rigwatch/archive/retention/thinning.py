@@ -12,6 +12,7 @@ from rigwatch.archive.second_aggregates import SecondAggregates
 from rigwatch.archive.store import Store, Stored
 from rigwatch.recorder import POSITIONS
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
+from rigwatch.wire.messages.quality_flags import valid
 from rigwatch.wire.session import SUFFIX, open_session
 
 REMARK = "its recording is removed, its figures per second are kept"
@@ -63,7 +64,7 @@ def finish_thinning(store: Store, kept: Catalogue, files: list[Stored]) -> int:
 def _as_figures(block: SampleBlock) -> EstimateBlock:
     """The channels as columns, with NaN for values that do not count."""
     columns = [
-        Column(f"samples.{one.name}", one.unit, np.where(one.quality == 0, one.values, np.nan))
+        Column(f"samples.{one.name}", one.unit, np.where(valid(one.quality), one.values, np.nan))
         if len(one.quality)
         else Column(f"samples.{one.name}", one.unit, one.values)
         for one in block.channels

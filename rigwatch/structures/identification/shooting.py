@@ -13,6 +13,7 @@ For nodes without a signal, `progressive_fit.py` follows one trajectory from the
 instead.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -119,8 +120,8 @@ def _grown(problem: Problem) -> _Grown:
     for horizon in _horizons(problem):
         tried = [Windows(problem, horizon) for _ in starts]
         ends = [one.refined(start, STEPS) for one, start in zip(tried, starts, strict=True)]
-        best = int(np.argmin([one.cost for one in tried]))
-        if grown.windows and tried[best].rms > max(WORSE * grown.windows.rms, SMALL):
+        best = cheapest([one.cost for one in tried])
+        if grown.windows and not tried[best].rms <= max(WORSE * grown.windows.rms, SMALL):
             grown.accepted = False
             return grown
         grown.windows, grown.parameters, starts = tried[best], ends[best], [ends[best]]
@@ -128,6 +129,11 @@ def _grown(problem: Problem) -> _Grown:
         unknowns[:count] = ends[best][problem.free]
         grown.found.append(unknowns)
     return grown
+
+
+def cheapest(costs: Sequence[float]) -> int:
+    """The place of the least cost; windows that diverged cost NaN, or infinitely much."""
+    return int(np.argmin(np.nan_to_num(costs, nan=np.inf)))
 
 
 def _over_the_whole(

@@ -137,7 +137,7 @@ def unless_two(found: Explanation) -> Explanation:
     """
     if not found.also:
         return found
-    text = f"{found.text}; {TWO_BEYOND_BASE}"
+    text = f"likely, not certain: {found.text}; {TWO_BEYOND_BASE}"
     return replace(
         found, verdict="undetermined", text=text, wrong_probability=None, wrong_at_most=None
     )
