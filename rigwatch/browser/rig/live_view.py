@@ -27,6 +27,8 @@ SHOWN_RATE = 64.0
 SHOWN_ESTIMATES = ("residual", "theta1", "theta2")
 SILENT = 3.0
 """Time without a message after which a process is called silent [s]."""
+MISSED = 3.0
+"""Samples whose time has to pass before their silence is told, of a rig that takes them slowly."""
 
 Lines = tuple[FloatArray, dict[str, FloatArray]]
 """Times of some samples [s], and values by name."""
@@ -41,6 +43,7 @@ class LiveView:
 
     def __init__(self, sample_rate: float) -> None:
         self._every = max(1, round(sample_rate / SHOWN_RATE))
+        self._silent = max(SILENT, MISSED / sample_rate)
         self._parts: dict[str, deque[tuple[int, Lines]]] = {
             "samples": deque(),
             "estimates": deque(),
@@ -134,10 +137,10 @@ class LiveView:
 
     def hears(self, now: float) -> bool:
         """Whether samples arrive."""
-        return now - self._heard.get("samples", -math.inf) < SILENT
+        return now - self._heard.get("samples", -math.inf) < self._silent
 
     def _armed(self, now: float) -> bool:
-        recent = now - self._heard.get("estimates", -math.inf) < SILENT
+        recent = now - self._heard.get("estimates", -math.inf) < self._silent
         return recent and bool(self._figures.get("armed", 0.0))
 
     def _why(self, now: float, learns: float) -> str:
@@ -148,7 +151,7 @@ class LiveView:
         told = [health.text for health, at in monitors if now - at <= SILENT]
         if any(told):
             return "; ".join(filter(None, told))
-        if now - self._heard.get("estimates", -math.inf) >= SILENT:
+        if now - self._heard.get("estimates", -math.inf) >= self._silent:
             return "no monitor runs: start `rigwatch monitor` or `rigwatch up`"
         if self._armed(now):
             return (

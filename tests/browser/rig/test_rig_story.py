@@ -126,6 +126,15 @@ def test_why_the_monitor_does_not_watch() -> None:
     assert live.states(9.0, 3.0)["processes"][0]["state"] == "silent"
 
 
+def test_a_slow_rig_is_not_silent_between_two_samples() -> None:
+    live = LiveView(0.1)
+    live._heard = {"samples": 0.0, "estimates": 0.0}
+    live._figures = {"armed": 1.0, "observable": 1.0}
+    assert live.hears(25.0)
+    assert live.states(25.0, 3.0)["why"] == ""
+    assert not live.hears(31.0)
+
+
 def test_a_rig_without_promotions_has_an_empty_history(tmp_path: Path) -> None:
     shell = Shell(tmp_path)
     assert promotions(shell.config, tmp_path) == []
