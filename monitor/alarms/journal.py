@@ -100,8 +100,6 @@ class AlarmJournal:
             self._newest[record.alarm.name] = record
         if not (self._waiting or self.failure):
             return
-        if len(self._waiting) > MOST_WAITING:
-            self._leave_out()
         try:
             file = self._open()
             if not os.fstat(file).st_nlink:
@@ -111,6 +109,8 @@ class AlarmJournal:
             if os.fstat(file).st_size > self._largest:
                 self._rotate()
         except OSError as error:
+            if len(self._waiting) > MOST_WAITING:
+                self._leave_out()
             self._fail(error)
             return
         self.failure, self._left_out = "", 0

@@ -241,6 +241,15 @@ def test_what_waits_for_a_full_disk_for_days_is_bounded_and_the_state_of_every_a
     assert restarted(path).standing() == expected.standing() != []
 
 
+def test_many_records_at_once_are_all_written_while_the_disk_takes_them(tmp_path):
+    path, changes = tmp_path / "alarms.jsonl", faulty_manager().take_changes()
+    many = changes * (2 + MOST_WAITING // len(changes))
+    journal = AlarmJournal(path)
+    journal.write(many)
+    assert journal.failure == ""
+    assert len(read_journal(path)[0]) == len(many) > MOST_WAITING
+
+
 def test_an_endless_line_is_one_bad_line(tmp_path):
     path = tmp_path / "alarms.jsonl"
     AlarmJournal(path).write(faulty_manager().take_changes())
