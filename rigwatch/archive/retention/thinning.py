@@ -11,8 +11,7 @@ from rigwatch.archive.entry import THINNED, Entry, stored_seconds
 from rigwatch.archive.second_aggregates import SecondAggregates
 from rigwatch.archive.store import Store, Stored
 from rigwatch.recorder import POSITIONS
-from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
-from rigwatch.wire.messages.quality_flags import valid
+from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock, valid
 from rigwatch.wire.session import SUFFIX, open_session
 
 REMARK = "its recording is removed, its figures per second are kept"
