@@ -176,6 +176,7 @@ class ModbusAdapter:
 
     def _poll(self, blocks: list[RawBlock]) -> None:
         """Read the new samples into `blocks`, which has those read so far if it fails."""
+        self._full = False
         header = self._header()
         if self._boot not in (None, header.boot):
             self._check()  # on a line that stays open another device may answer now

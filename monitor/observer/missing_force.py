@@ -143,8 +143,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
 def _remainder(z: FloatArray, known: Polynomial, scaled: FloatArray) -> float:
     """w·φ(z)."""
     count = z.size
-    for i in range(count):
-        scaled[i] = (z[i] - known.centre[i]) / known.scale[i]
+    scale_signals(z, known.centre, known.scale, scaled)
     total, place = 0.0, count
     for i in range(count):
         total += known.weights[i] * scaled[i]
@@ -152,6 +151,13 @@ def _remainder(z: FloatArray, known: Polynomial, scaled: FloatArray) -> float:
             total += known.weights[place] * scaled[i] * scaled[j]
             place += 1
     return total
+
+
+@part()
+def scale_signals(z: FloatArray, centre: FloatArray, scale: FloatArray, scaled: FloatArray) -> None:
+    """Fill `scaled` with the arguments of the remainder."""
+    for i in range(z.size):
+        scaled[i] = (z[i] - centre[i]) / scale[i]
 
 
 @part()

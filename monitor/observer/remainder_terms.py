@@ -17,7 +17,7 @@ import numpy as np
 
 from monitor.model import RemainderSection
 from monitor.observer.lagged_motion import EMPTY, FIRST
-from monitor.observer.missing_force import at_rest, high_pass
+from monitor.observer.missing_force import at_rest, high_pass, scale_signals
 from rigwatch.physics.transfer import filter_sample
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
@@ -122,8 +122,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
     for k in range(state.size):
         if state[k] == EMPTY:
             continue
-        for i in range(scaled.size):
-            scaled[i] = (z[k, i] - centre[i]) / scale[i]
+        scale_signals(z[k], centre, scale, scaled)
         _fill_terms(scaled, counts, out[k])
         if state[k] == FIRST:
             at_rest(out[k], kept, b)

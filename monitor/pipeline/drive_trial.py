@@ -26,7 +26,7 @@ from monitor.pipeline.observer_pipeline import ObserverMonitor
 from monitor.pipeline.result import Result
 from monitor.signals import Condition, above
 from monitor.signals import conditions as kinds
-from monitor.wiring import DRIVE, DRIVE_GAIN, FAILURES, WINDOW
+from monitor.wiring import DRIVE, DRIVE_GAIN, FAILURES, window_samples
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.messages import SampleBlock, cut
 
@@ -49,7 +49,7 @@ class DriveTrial:
 
     def __init__(self, model: RigModel) -> None:
         self._accepted = DRIVE in model.accepted_wiring
-        self._length = max(1, round(WINDOW * model.sample_rate))
+        self._length = window_samples(model.sample_rate)
         self._longest, self._pause = (round(s * model.sample_rate) for s in (LONGEST, PAUSE))
         self._tried = [_Tried(factor, model, self._length) for factor in FACTORS]
         self._own = _Windows(self._length)

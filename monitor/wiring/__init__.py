@@ -4,6 +4,6 @@ At the monitor's start (`WiringCheck`), and of recordings that a model is made o
 """
 
 from monitor.wiring.recorded_wiring import recorded_wiring
-from monitor.wiring.wiring_check import DRIVE, DRIVE_GAIN, FAILURES, WINDOW, WiringCheck
+from monitor.wiring.wiring_check import DRIVE, DRIVE_GAIN, FAILURES, WiringCheck, window_samples
 
-__all__ = ["DRIVE", "DRIVE_GAIN", "FAILURES", "WINDOW", "WiringCheck", "recorded_wiring"]
+__all__ = ["DRIVE", "DRIVE_GAIN", "FAILURES", "WiringCheck", "recorded_wiring", "window_samples"]

@@ -6,7 +6,7 @@ import numpy as np
 
 from monitor.signals import Recording
 from monitor.wiring.motion_ratio import MotionRatio, motion_ratio
-from monitor.wiring.wiring_check import GAIN, PHASE, SCALE, SIGN, WINDOW, wrong_wiring
+from monitor.wiring.wiring_check import GAIN, PHASE, SCALE, SIGN, window_samples, wrong_wiring
 from rigwatch.wire.wiring_names import Wiring
 
 
@@ -35,7 +35,7 @@ def recorded_wiring(recording: Recording) -> tuple[Wiring, str] | None:
 def _ratios(recording: Recording, position: str, acceleration: str) -> list[MotionRatio]:
     """One of each second with motion."""
     x, a, rate = recording.channel(position), recording.channel(acceleration), recording.sample_rate
-    length = max(1, round(WINDOW * rate))
+    length = window_samples(rate)
     starts = range(0, len(x) - length + 1, length)
     windows = (slice(start, start + length) for start in starts)
     found = (motion_ratio(x[window], a[window], rate) for window in windows)

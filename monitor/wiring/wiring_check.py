@@ -41,6 +41,11 @@ differ by ten or more.
 SIGN, SCALE, SWAPPED, DRIVE = WIRING
 
 
+def window_samples(rate: float) -> int:
+    """Length of a window at a rate [Hz], in samples; at least one."""
+    return max(1, round(WINDOW * rate))
+
+
 class WiringCheck:
     """The check of one rig; it does nothing unless one channel is in m and one in m/s^2.
 
@@ -55,7 +60,7 @@ class WiringCheck:
         self._drive = ModelledDrive(model) if compared else None
         self._noise = model.noise.residual
         self._accepted = frozenset[str](model.accepted_wiring)
-        self._length = max(1, round(WINDOW * model.sample_rate))
+        self._length = window_samples(model.sample_rate)
         self._boot = self._next = -1
         self._restart()
 

@@ -133,10 +133,6 @@ class MessageRing:
                 beside += pack.size if pack.first >= first else 0
 
 
-def _as_it_is(answer: Answer) -> Answer:
-    return answer
-
-
 def capacity_of(topic: Topic, ring_bytes: int) -> int:
     """Capacity of a topic's ring [bytes]."""
     return ring_bytes if topic.rate_hz else min(ring_bytes, RARE_BYTES)
@@ -161,7 +157,7 @@ class Outlet:
         ring_bytes: int = RING_BYTES,
         kept: KeptMessages | None = None,
         *,
-        counted: Callable[[Answer], Answer] = _as_it_is,
+        counted: Callable[[Answer], Answer],
     ) -> None:
         self.run = 1 + secrets.randbits(52)
         self._kept, self._counted = kept, counted

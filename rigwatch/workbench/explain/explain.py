@@ -137,9 +137,17 @@ def unless_two(found: Explanation) -> Explanation:
     """
     if not found.also:
         return found
-    text = f"likely, not certain: {found.text}; {TWO_BEYOND_BASE}"
+    return _unsure(replace(found, text=f"{found.text}; {TWO_BEYOND_BASE}"))
+
+
+def _unsure(found: Explanation) -> Explanation:
+    """What is named, without confidence."""
     return replace(
-        found, verdict="undetermined", text=text, wrong_probability=None, wrong_at_most=None
+        found,
+        verdict="undetermined",
+        text=f"likely, not certain: {found.text}",
+        wrong_probability=None,
+        wrong_at_most=None,
     )
 
 
@@ -155,18 +163,19 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
     """
     bench, told = first.bench, first.explanation
     rarer = suitable(bench.study)[1]
-    asked = told.exchange is None and (_asks_for_rarer(first) or _only_training_may_ask(first))
+    by_training = _only_training_may_ask(first)
+    asked = told.exchange is None and (_asks_for_rarer(first) or by_training)
     if not (asked and rarer and tries_rarer(bench.study)):
         return first
     wider = with_whole_library(bench.study)
     rows = rank_all(wider, bench.data, bench.base)
-    least = SHOWN if _only_training_may_ask(first) else BY_CHANCE
+    least = SHOWN if by_training else BY_CHANCE
     if not any(row.effect in rarer and row.p_value < least for row in rows):
         return _unless_named(first, f"nor is it like one of {len(rarer)} rarer ones")
     progress(f"no usual effect explains the error: trying {len(rarer)} rarer ones")
     rows = rank(wider, bench.data, bench.base, bench.floor, progress, known=first.rows)
     none = f"nor does one of {len(rarer)} rarer ones"
-    replaces = _trains_better if _only_training_may_ask(first) else _may_replace
+    replaces = _trains_better if by_training else _may_replace
     if not any(row.effect in rarer and replaces(first, row) for row in rows):
         return _unless_named(first, none)
     second = _explained_once(replace(bench, study=wider), progress, rows)
@@ -175,13 +184,10 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
         return _unless_named(first, none)
     text = RARER.format(text=found.text, count=len(rarer))
     unlike = "; ".join([*filter(None, [found.unlike]), SECOND_PASS])
-    word = found.verdict
+    doubted = replace(found, text=text, unlike=unlike, wrong_probability=None, wrong_at_most=None)
     # Usual effects found nothing to explain: one of many rarer ones is not named with confidence.
-    if told.verdict == "nothing_missing" and word == "missing_effect":
-        word, text = "undetermined", f"likely, not certain: {text}"
-    doubted = replace(
-        found, verdict=word, text=text, unlike=unlike, wrong_probability=None, wrong_at_most=None
-    )
+    if told.verdict == "nothing_missing" and found.verdict == "missing_effect":
+        doubted = _unsure(doubted)
     return replace(second, explanation=doubted)
 
 
