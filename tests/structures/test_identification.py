@@ -137,9 +137,26 @@ def test_an_unknown_start_is_found():
     structure = antenna()
     truth = TRUTH | {"v6(0)": 0.0}
     guess = {"v6(0)": 3.0}
-    for method in ("quasilinearization", "shooting"):
+    for method in ("quasilinearization", "kalman", "shooting"):
         found = identify(method, structure, record(), [*NAMES, "v6(0)"], guess)
         assert abs(found.parameters["v6(0)"]) < 0.2, truth
+
+
+def test_the_interval_of_an_unknown_start_is_of_the_record():
+    made, nodes, names = simulate(FILE, 0.01, 10.0), range(1, 9), [*NAMES, "x6(0)", "v6(0)"]
+    within, seeds = 0, 10
+    for seed in range(seeds):
+        noisy = with_noise(made, {f"x{node}": 0.1 for node in nodes}, seed)
+        noise = [np.std(noisy.columns[f"x{node}"] - made.columns[f"x{node}"]) for node in nodes]
+        found = identify(
+            "kalman", antenna(), positions(noisy, 0.01), names, {"v6(0)": 3.0},
+            noise=np.array(noise),
+        )  # fmt: skip
+        assert found.converged
+        assert found.intervals["x6(0)"][1] - found.parameters["x6(0)"] < 0.01
+        assert found.intervals["v6(0)"][1] - found.parameters["v6(0)"] < 0.2
+        within += sum(low < 0.0 < high for low, high in map(found.intervals.get, names[-2:]))
+    assert within >= 2 * seeds - 4  # 95 % each: fewer in 1 of 400
 
 
 def test_a_weighted_record_counts_where_the_weight_is(clean):

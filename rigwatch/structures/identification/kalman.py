@@ -5,9 +5,12 @@ The augmented state X = {x, a} is predicted and corrected sample by sample,
     X(k+1/k) by integration,   P(k+1/k) = Φ·P·Φᵀ + W                                 (2.37), (2.38)
     K = P·Hᵀ·(H·P·Hᵀ + V)⁻¹,   P ← (I − K·H)·P·(I − K·H)ᵀ + K·V·Kᵀ                   (2.40)-(2.42)
 
-and the filter passes over the record repeatedly: the parameters start from the result of the last
+and the filter passes over the record repeatedly: the unknowns start from the result of the last
 pass, with their covariance enlarged by a weight. Φ is exact here, not I + Δt·∂g/∂X. The noise is an
 input, as published; the method does not estimate it.
+
+An unknown initial state stands in X a second time, as a constant like the parameters (a fixed-point
+smoother), so that the whole record corrects it and its interval is of the record.
 """
 
 from dataclasses import dataclass
@@ -39,7 +42,7 @@ def solve(
         noise: standard deviation of each output's noise, shape (outputs,); or one number, as a
             share of each output's rms.
         spread: standard deviation of the guess, as a share of it.
-        weight: factor on the parameters' covariance from one pass to the next.
+        weight: factor on the unknowns' covariance from one pass to the next.
         drift: standard deviation of the system noise per sample, as a share of each state's rms.
 
     Raises:
@@ -88,38 +91,42 @@ class _Filter:
     def through(
         self, unknowns: FloatArray, covariance: FloatArray
     ) -> tuple[FloatArray | None, FloatArray]:
-        """Unknowns and their covariance after the pass; None if it diverged.
-
-        Initial states are smoothed only through the parameters; they keep their initial values.
-        """
+        """Unknowns and their covariance after the pass; None if it diverged."""
         problem, sweeper = self.problem, self.problem.sweeper
         parameters, x = problem.split(unknowns)
-        m, n = len(problem.free), len(x)
-        whole = self._joined(covariance, m, n)
-        inputs, dt, steps = problem.recording.inputs, problem.recording.dt, np.eye(m + n)
-        system_noise = np.concatenate([np.zeros(m), (self.drift * self.size) ** 2])
+        m, c, n = len(problem.free), len(unknowns), len(x)
+        found, whole = unknowns.copy(), self._joined(covariance, m, n)
+        inputs, dt, steps = problem.recording.inputs, problem.recording.dt, np.eye(c + n)
+        moving = [*range(m), *range(c, c + n)]
+        system_noise = np.concatenate([np.zeros(c), (self.drift * self.size) ** 2])
         for k in range(len(problem.observed)):
             row = problem.first + k
             y, read = sweeper.observe(inputs, dt, row, x, parameters)
-            change, whole = self._corrected(whole, problem.observed[k] - y, read)
-            parameters[problem.free] += change[:m]
-            x += change[m:]
+            along = np.zeros((len(y), c + n))
+            along[:, moving] = read
+            change, whole = self._corrected(whole, problem.observed[k] - y, along)
+            found += change[:c]
+            parameters[problem.free] = found[:m]
+            x += change[c:]
             if not np.isfinite(change).all() or not np.isfinite(whole).all():
                 return None, covariance
             if k + 1 < len(problem.observed):
-                steps[m:] = sweeper.forward(inputs, dt, row, problem.substeps, x, parameters)
+                steps[c:, moving] = sweeper.forward(
+                    inputs, dt, row, problem.substeps, x, parameters
+                )
                 whole = steps @ whole @ steps.T
-                whole[np.diag_indices(m + n)] += system_noise
-        after = covariance.copy()
-        after[:m, :m] = whole[:m, :m]
-        return np.concatenate([parameters[problem.free], unknowns[m:]]), after
+                whole[np.diag_indices(c + n)] += system_noise
+        return found, whole[:c, :c]
 
     def _joined(self, covariance: FloatArray, m: int, n: int) -> FloatArray:
-        """Covariance of {a, x} at the first sample; zero for known initial states."""
-        whole = np.zeros((m + n, m + n))
-        places = np.concatenate([np.arange(m), m + self.problem.loose])
-        whole[np.ix_(places, places)] = covariance
-        return whole
+        """Covariance of {a, x(0), x} at the first sample, where an unknown x is its x(0).
+
+        A known initial state has none.
+        """
+        count = len(covariance)
+        copied = np.concatenate([np.eye(count), np.zeros((n, count))])
+        copied[count + self.problem.loose, np.arange(m, count)] = 1.0
+        return np.asarray(copied @ covariance @ copied.T)
 
     def _corrected(
         self, whole: FloatArray, innovation: FloatArray, read: FloatArray
