@@ -1,20 +1,23 @@
 """Records that are damaged, or tell nothing: one plain line, and no value is made up."""
 
 import contextlib
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from rigwatch.commands import main
 from rigwatch.structures.damage.examination import Settings, examine
+from rigwatch.structures.identification import kalman
 from rigwatch.structures.identification.gauss_newton import solve
 from rigwatch.structures.identification.identify import METHODS, identify
 from rigwatch.structures.identification.problem import problem_of
 from rigwatch.structures.model.checks import load_structure
-from rigwatch.structures.records.record import Record, read_record
+from rigwatch.structures.records.record import Record, read_record, write_record
 from rigwatch.wire.errors import ImportDataError, ModelError
 from sim_plant.structure import simulate
-from tests.structures.antenna import NAMES, antenna
+from tests.structures.antenna import FILE, NAMES, antenna, record
 
 TIME = np.arange(100) * 0.01
 
@@ -61,6 +64,31 @@ def test_a_record_at_rest_tells_nothing(method: str, names: tuple[str, ...]) -> 
     with contextlib.suppress(ModelError):
         found = identify(method, antenna(), still, NAMES)
     assert found is None or not found.converged
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_channel_that_is_always_0_ends_no_method_in_a_traceback(method: str) -> None:
+    columns = dict(record().columns)
+    columns["x1"] = np.zeros_like(columns["x1"])
+    found = identify(method, antenna(), Record(0.01, columns), NAMES)
+    if method == "kalman":
+        assert found.converged
+        assert found.parameters["k4_46"] == pytest.approx(100.0, rel=1e-3)
+        assert "x1 shows no noise, as it is always 0: left out" in found.remarks
+
+
+def test_a_method_that_fails_does_not_take_the_others_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fails(*_: object, **__: object) -> None:
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr(kalman, "solve", fails)
+    write_record(record(), tmp_path / "antenna.csv")
+    assert main(["structure", "compare", str(FILE), str(tmp_path / "antenna.csv"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["kalman"]["error"].endswith("kalman cannot go on: Singular matrix")
+    assert told["shooting"]["converged"]
 
 
 def test_an_unknown_that_is_lost_on_the_way_is_refused_at_the_end() -> None:

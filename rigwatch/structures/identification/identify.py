@@ -19,7 +19,7 @@ from rigwatch.structures.identification.problem import Problem, problem_of
 from rigwatch.structures.model import Structure
 from rigwatch.structures.records import Record
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.errors import ModelError
+from rigwatch.wire.errors import ModelError, one_line
 
 METHODS: dict[str, str] = {
     # name: module with `solve(problem, ...) -> Outcome`
@@ -111,10 +111,18 @@ def identify(
 
 
 def solved(method: str, problem: Problem, **options: Any) -> Identification:
-    """The result of a method on a prepared problem; errors as in `identify`."""
+    """The result of a method on a prepared problem; errors as in `identify`.
+
+    Raises:
+        ModelError: the method's numbers ended it, as a matrix that cannot be inverted does.
+    """
     solve = solver(method)
     started = time.perf_counter()
-    outcome = solve(problem, **options)
+    try:
+        outcome = solve(problem, **options)
+    except (ArithmeticError, ValueError) as error:  # also of linear algebra
+        name = problem.system.model.name
+        raise ModelError(f"{name}: {method} cannot go on: {one_line(error)}") from error
     return _named(method, problem, outcome, time.perf_counter() - started)
 
 

@@ -52,16 +52,17 @@ def solve(
     if not np.nanmax(run.variance, initial=0.0) > 0:
         name = problem.system.model.name
         raise ModelError(f"{name}: found signals that never change, expected a record of motion")
+    remarks = (*run.remarks, REMARK)
     found, covariance = [problem.guess], run.prior(problem.guess, spread)
     for turn in range(iterations):
         unknowns, after = run.through(found[-1], covariance)
         if unknowns is None:
-            return Outcome(found[1:] or found, None, False, ("the filter diverged", REMARK))
+            return Outcome(found[1:] or found, None, False, ("the filter diverged", *remarks))
         found.append(unknowns)
         if turn and settled(found[-2], found[-1]):
-            return Outcome(found[1:], after, True, (REMARK,))
+            return Outcome(found[1:], after, True, remarks)
         covariance = after * weight
-    return Outcome(found[1:], covariance / weight, False, (REMARK,))
+    return Outcome(found[1:], covariance / weight, False, remarks)
 
 
 @dataclass
@@ -80,6 +81,16 @@ class _Filter:
             self.noise * np.ones_like(size) * (size if np.isscalar(self.noise) else 1)
         ) ** 2
         self.size = np.sqrt(np.mean(problem.shown[problem.first :] ** 2, axis=0))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """The outputs that are left out, if there are any."""
+        outputs, observed = self.problem.system.model.outputs, self.problem.observed
+        seen = np.isfinite(observed).any(axis=0)
+        silent = [
+            n for n, there, v in zip(outputs, seen, self.variance, strict=True) if there and not v
+        ]
+        return tuple(f"{name} shows no noise, as it is always 0: left out" for name in silent)
 
     def prior(self, guess: FloatArray, spread: float) -> FloatArray:
         """Covariance of the unknowns before the first pass."""
@@ -131,7 +142,7 @@ class _Filter:
     def _corrected(
         self, whole: FloatArray, innovation: FloatArray, read: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        use = np.isfinite(innovation)
+        use = np.isfinite(innovation) & (self.variance > 0)
         h, v = read[use], np.diag(self.variance[use])
         gain = np.linalg.solve(h @ whole @ h.T + v, h @ whole).T
         left = np.eye(len(whole)) - gain @ h
