@@ -142,6 +142,7 @@ def _whole(found: "Examination") -> dict[str, Any]:
             "parameters": _intervals(base.figures),
             "noise": dict(zip(base.model.signals, base.sigma.tolist(), strict=True)),
             "noise_units": {name: outputs[name].unit for name in base.model.signals},
+            "unjudged": list(base.unjudged),
         },
         "threshold": found.watches[0].threshold,
         "damages": [_plain(damage) for damage in found.damages],

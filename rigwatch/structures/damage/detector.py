@@ -140,11 +140,11 @@ def noise(residual: FloatArray, observed: FloatArray, unknowns: int = 0) -> Floa
     """Standard deviation of undamaged residuals, at least the integration error, shape (m,).
 
     Args:
-        residual: shape (samples, m); NaN where missing.
+        residual: shape (samples, m); NaN where missing, never a whole signal.
         observed: the signals, of the same shape.
         unknowns: number of figures identified from these samples, which took part of the noise.
     """
     count = int(np.isfinite(residual).sum())
     size = np.sqrt(np.nanmean(observed**2, axis=0))
     found = np.sqrt(np.nanmean(residual**2, axis=0) * count / max(count - unknowns, 1))
-    return np.asarray(np.maximum(np.nan_to_num(found), FLOOR * np.nan_to_num(size)) + 1e-300)
+    return np.asarray(np.maximum(found, FLOOR * size) + 1e-300)

@@ -44,6 +44,7 @@ class Reference:
         sigma: standard deviation of each signal's noise, shape (m,).
         samples: number of undamaged samples used.
         freedom: valid ones of each signal, less what was identified from them: what `sigma` is of.
+        unjudged: sensors that the undamaged start says too little of; the model leaves them out.
     """
 
     model: SpringModel
@@ -53,6 +54,7 @@ class Reference:
     sigma: FloatArray
     samples: int
     freedom: int
+    unjudged: tuple[str, ...] = ()
 
 
 def reference(
@@ -75,7 +77,8 @@ def reference(
         model: the structure with another record, to reuse its kernel if `known` is set.
 
     Raises:
-        ModelError: the undamaged start is too short, or does not determine the unknowns.
+        ModelError: the undamaged start is too short, holds too little of every sensor, or does not
+            determine the unknowns.
     """
     samples = round(undamaged / record.dt)
     if not LEAST <= samples <= len(record):
@@ -83,9 +86,11 @@ def reference(
             f"{structure.name}: found {undamaged:g} s of undamaged record, expected between"
             f" {LEAST * record.dt:g} and {len(record) * record.dt:g} s"
         )
+    record, unjudged = _judged(structure, record, samples)
     unknowns = _unknowns(structure, known=known, moving=moving)
     names, values, covariance = _identified(structure, record, samples, unknowns)
-    if not unknowns and model is not None:
+    there = tuple(name for name in structure.signals if name in record.columns)
+    if not unknowns and model is not None and model.signals == there:
         model = with_record(model, record)
     else:
         model = spring_model(structure, record, dict(zip(names, values.tolist(), strict=True)))
@@ -103,7 +108,26 @@ def reference(
         if not (moving and name.endswith("(0)"))
     }
     spread, freedom = _spread(model, names, covariance), max(left // len(sigma), 1)
-    return Reference(model, parameters, figures, spread, sigma, samples, freedom)
+    return Reference(model, parameters, figures, spread, sigma, samples, freedom, unjudged)
+
+
+def _judged(structure: Structure, record: Record, samples: int) -> tuple[Record, tuple[str, ...]]:
+    """The record without the sensors whose noise its first samples do not show; and their names."""
+    there = [name for name in structure.signals if name in record.columns]
+    dropped = tuple(name for name in there if not _tells(record.columns[name][:samples]))
+    if there and len(dropped) == len(there):
+        raise ModelError(
+            f"{structure.name}: found no undamaged sensor of {', '.join(there)} with {LEAST}"
+            " samples that are not all 0, expected at least one whose noise they show"
+        )
+    kept = {name: column for name, column in record.columns.items() if name not in dropped}
+    return Record(record.dt, kept), dropped
+
+
+def _tells(values: FloatArray) -> bool:
+    """Whether undamaged samples of a sensor show its noise: a few, and not nothing but 0."""
+    there = np.isfinite(values)
+    return bool(there.sum() >= LEAST and np.any(values[there]))
 
 
 def _unknowns(structure: Structure, *, known: bool, moving: bool) -> list[str]:

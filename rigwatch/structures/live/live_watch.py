@@ -10,6 +10,7 @@ Nothing here reads a clock, bus or file, and samples are processed one by one: t
 identical to the bit however the samples are cut into blocks, live or from a recording.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -29,10 +30,18 @@ from rigwatch.structures.damage import (
 )
 from rigwatch.structures.model import Structure
 from rigwatch.structures.records import GrowingRecord
-from rigwatch.structures.report import verdict
+from rigwatch.structures.report import too_little, verdict
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.wire.messages import Alarm, Column, EstimateBlock, Event, SampleBlock, cut
+from rigwatch.wire.messages import (
+    Alarm,
+    Column,
+    EstimateBlock,
+    Event,
+    SampleBlock,
+    Severity,
+    cut,
+)
 
 Said = EstimateBlock | Alarm | Event
 
@@ -87,7 +96,8 @@ class LiveDamage:
         settings = replace(self._settings, known=True, undamaged=LEAST * self._dt)
         trial, count = LiveDamage(self._structure, self._dt, settings), LEAST + 2
         names = (*self._structure.signals, *self._loads)
-        still = [Column(name, "", np.zeros(count)) for name in names]
+        # Not 0: a sensor that shows no noise is not judged.
+        still = [Column(name, "", np.full(count, 1e-9)) for name in names]
         numbers = np.arange(count)
         trial.update(SampleBlock("", 0, 0, numbers, numbers, tuple(still)))
 
@@ -144,9 +154,10 @@ class LiveDamage:
         except ModelError as error:
             self._stage = "reported"
             return [self._event(row, "error", "NOT WATCHED", str(error))]
-        self._beside = _UndamagedRun(base, settings, self._dt)
+        self._beside = _UndamagedRun(base, settings, self._dt, self._structure.signals)
         self._stage = "watching"
-        messages: list[Said] = [self._event(row, "info", "WATCHED", _learnt(base))]
+        severity: Severity = "warning" if base.unjudged else "info"
+        messages: list[Said] = [self._event(row, severity, "WATCHED", _learnt(base))]
         for past in range(row + 1):
             over = self._beside.step(self._record, past)[1]
             messages += self._judged(past, over=over)
@@ -184,7 +195,7 @@ class LiveDamage:
             first_out=True, user="", onset_seq=self._first + row + 1 - judge.zero,
         )  # fmt: skip
 
-    def _event(self, row: int, severity: Literal["info", "error", "critical"], code: str,
+    def _event(self, row: int, severity: Severity, code: str,
                text: str) -> Event:  # fmt: skip
         return Event(SOURCE, int(self._record.t_ns[row]), severity, code, text)
 
@@ -203,8 +214,11 @@ class LiveDamage:
 class _UndamagedRun:
     """The undamaged model, run in parallel with the samples one step at a time."""
 
-    def __init__(self, base: Reference, settings: LiveSettings, dt: float) -> None:
+    def __init__(
+        self, base: Reference, settings: LiveSettings, dt: float, signals: Sequence[str]
+    ) -> None:
         self.model = base.model
+        self._judged = [signals.index(name) for name in base.model.signals]
         system = base.model.problem.system
         self.units = [system.model.outputs[name].unit for name in base.model.signals]
         self._parameters = base.parameters
@@ -228,9 +242,10 @@ class _UndamagedRun:
         outputs, _ = self.model.problem.sweeper.observe(
             record.inputs, record.dt, row, self._state, self._parameters
         )
-        residual = outputs[:count] - record.observed[row]
+        observed = record.observed[row, self._judged]
+        residual = outputs[:count] - observed
         scaled = self._innovations.update(
-            record.inputs, record.dt, row, record.observed[row], learnt=row < self._learnt
+            record.inputs, record.dt, row, observed, learnt=row < self._learnt
         )
         over = self.judge.update(scaled)
         return np.append(residual, self.judge.value / self.judge.threshold), over
@@ -258,4 +273,5 @@ def _learnt(base: Reference) -> str:
         f"{name} = {figure.value:.6g} {units.get(name, '')}".rstrip()
         for name, figure in base.figures.items()
     )
-    return f"undamaged structure learnt from {base.samples} samples" + (found and f": {found}")
+    learnt = f"undamaged structure learnt from {base.samples} samples" + (found and f": {found}")
+    return learnt + (f". {too_little(base.unjudged)}" if base.unjudged else "")

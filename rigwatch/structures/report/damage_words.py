@@ -1,6 +1,8 @@
 """The result of an examination as text."""
 
-from rigwatch.structures.damage import Damage, Examination, Ranking
+from collections.abc import Sequence
+
+from rigwatch.structures.damage import LEAST, Damage, Examination, Ranking
 from rigwatch.structures.model import label
 
 
@@ -23,15 +25,24 @@ def changes(damage: Damage) -> str:
 
 
 def remark(found: Examination) -> str:
-    """Caveats about the sensors, empty if every position is measured."""
-    model = found.reference.model
+    """Caveats about the sensors, empty if every position is measured and judged."""
+    model, unjudged = found.reference.model, found.reference.unjudged
     nodes = [label("x", node) for node in model.structure.nodes]
-    hidden = [name for name in nodes if name not in model.signals]
+    hidden = [name for name in nodes if name not in (*model.signals, *unjudged)]
+    words = f" {too_little(unjudged)}" if unjudged else ""
     if not hidden:
-        return ""
-    return (
+        return words
+    return words + (
         f" The positions {', '.join(hidden)} were not measured: large changes that move them are"
         " noticed, but located less surely."
+    )
+
+
+def too_little(unjudged: Sequence[str]) -> str:
+    """What it means that the undamaged start does not show the noise of some sensors."""
+    return (
+        f"{', '.join(unjudged)}: no undamaged noise to judge by (fewer than {LEAST} samples, or all"
+        " 0), so nothing that was measured there counts."
     )
 
 
