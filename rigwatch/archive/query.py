@@ -16,6 +16,8 @@ from rigwatch.archive.questions import COUNTS_BACK, QUESTIONS
 from rigwatch.archive.store import Store
 from rigwatch.wire.errors import ArchiveError, nearest
 
+MOST_RIGS = 100_000
+"""Rigs of an archive that a question counts back for."""
 _BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)
 _END = datetime(9999, 1, 1, tzinfo=UTC)
 
@@ -106,7 +108,7 @@ def ask(
         name: the question.
         rig: name of a rig, or a pattern with %.
         since, until: span of time; by default all. A question that counts back from `until` does
-            so from the end of the last session.
+            so from the end of each rig's last session.
         bounds: what it may take.
 
     Raises:
@@ -115,11 +117,11 @@ def ask(
     if name not in QUESTIONS:
         raise ArchiveError(f"query: no question {name!r}{nearest(name, QUESTIONS)}")
     sql = QUESTIONS[name].sql
-    if until is None and COUNTS_BACK in sql:
-        until = _after_all(store)
-    times = {"since": since or _BEGINNING, "until": until or _END}
     pattern = rig.replace("!", "!!").replace("_", "!_")
-    given = {"rig": pattern} | {name: _plain(time) for name, time in times.items()}
+    times = {"since": since or _BEGINNING, "until": until or _END}
+    given: dict[str, Any] = {"rig": pattern} | {name: _plain(t) for name, t in times.items()}
+    if COUNTS_BACK in sql:
+        given |= _ends(store, pattern, until)
     return query(store, sql, {k: v for k, v in given.items() if f"${k}" in sql}, bounds)
 
 
@@ -128,11 +130,16 @@ def _plain(time: datetime) -> datetime:
     return time.astimezone(UTC).replace(tzinfo=None)
 
 
-def _after_all(store: Store) -> datetime:
-    """A time after the last session."""
-    rows = query(store, 'select max("end") + interval 1 second from sessions').rows
-    last: datetime | None = rows[0][0]
-    return last.replace(tzinfo=UTC) if last else _END
+def _ends(store: Store, pattern: str, until: datetime | None) -> dict[str, Any]:
+    """Given to a question that counts back: of each rig, `until` or the end of its sessions."""
+    sql = (
+        'select rig, max("end") + interval 1 second from sessions'
+        " where rig like $rig escape '!' and \"end\" is not null group by rig"
+    )
+    found = query(store, sql, {"rig": pattern}, Bounds(rows=MOST_RIGS)).rows
+    ends = [_plain(until) if until else end for _, end in found]
+    extremes = {"first": min(ends, default=_plain(_END)), "last": max(ends, default=_plain(_END))}
+    return {"names": [name for name, _ in found], "ends": ends} | extremes
 
 
 def _check(duckdb: Any, connection: Any, sql: str) -> None:

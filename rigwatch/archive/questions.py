@@ -9,32 +9,37 @@ class Question:
 
     Attributes:
         text: what it answers.
-        sql: with the parameters $rig (a pattern, ! before what is literal), $since and $until.
+        sql: with the parameters $rig (a pattern, ! before what is literal), $since and $until; or,
+            if it counts back, $names (the rigs), $ends (of each, where its time ends), and the
+            $first and $last of these.
     """
 
     text: str
     sql: str
 
 
-COUNTS_BACK = "$until - interval"
-"""In the SQL of a question about the time before `until`, for which an end far off will not do."""
+COUNTS_BACK = "$ends"
+"""In the SQL of a question about the time before an end, for which one far off will not do."""
 _OF_RIG = "rig like $rig escape '!'"
 _IN_SPAN = f"{_OF_RIG} and time >= $since and time < $until"
 _RECORDED = f'{_OF_RIG} and "end" >= $since and start < $until'
 _SOUND = "status <> 'duplicate'"
-_LEVEL = f"""
+# The days are compared with constants too: the engine skips the files of the others.
+_LEVEL = """
     select rig, unit, sum(mean * count) / sum(count) as level, count(*) / 3600 as hours
-    from seconds
-    where name = 'theta1' and {_OF_RIG}
-      and day between ({COUNTS_BACK} {{first}} day)::date and ({COUNTS_BACK} {{last}} day)::date
-      and second >= {COUNTS_BACK} {{first}} day and second < {COUNTS_BACK} {{last}} day
+    from seconds join ends using (rig)
+    where name = 'theta1'
+      and day between ($first - interval {first} day)::date and ($last - interval {last} day)::date
+      and second >= until - interval {first} day and second < until - interval {last} day
     group by rig, unit
 """
 
 QUESTIONS: dict[str, Question] = {
     "friction-growth": Question(
-        "whose Coulomb friction (theta1) grew in the 30 days before --until",
-        f"with now as ({_LEVEL.format(first=30, last=0)}), "
+        "whose Coulomb friction (theta1) grew in the 30 days before --until, or its newest session",
+        "with ends as (select unnest($names::varchar[]) as rig, "
+        f"unnest({COUNTS_BACK}::timestamp[]) as until), "
+        f"now as ({_LEVEL.format(first=30, last=0)}), "
         f"before as ({_LEVEL.format(first=60, last=30)}) "
         "select rig, unit, before.level as before, now.level as now, "
         "now.level - before.level as growth, before.hours as hours_before, now.hours as hours_now "

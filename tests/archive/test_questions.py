@@ -47,6 +47,22 @@ def test_whose_friction_grew(store):
     assert ask(store, "friction-growth").as_dicts() == found  # up to the end of the last session
 
 
+def test_each_rig_counts_back_from_its_own_newest_session(tmp_path):
+    for day, friction in ((5, 1.0), (40, 4.0)):
+        write_session(tmp_path / f"one{day}.mcap", start_s=day * DAY_S, friction=friction)
+    for day in (100, 300):  # long after the other was last recorded
+        write_session(tmp_path / f"two{day}.mcap", rig="bench2", start_s=day * DAY_S, friction=2.0)
+    store = Store(str(tmp_path))
+    index(store)
+    (row,) = ask(store, "friction-growth").as_dicts()
+    assert row["rig"] == "bench1"
+    assert row["growth"] == pytest.approx(3.0, abs=1e-2)
+    assert ask(store, "friction-growth", rig="bench2").rows == []  # two months before: nothing
+    assert ask(store, "friction-growth", rig="bench3").rows == []
+    until = datetime(2026, 1, 1, tzinfo=UTC) + timedelta(days=301)
+    assert ask(store, "friction-growth", until=until).rows == []  # of these 30 days
+
+
 def test_a_question_that_counts_back_from_the_end_is_known_as_one():
     counting = {name for name, question in QUESTIONS.items() if "interval" in question.sql}
     assert counting == {name for name, question in QUESTIONS.items() if COUNTS_BACK in question.sql}
