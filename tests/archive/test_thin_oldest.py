@@ -102,6 +102,28 @@ def test_a_kill_at_any_point_loses_nothing(tmp_path: Path) -> None:
     assert figures(tmp_path) == [("samples.position", 64 * SEGMENTS), ("theta1", 63 * SEGMENTS)]
 
 
+def test_a_kill_before_the_empty_folder_goes_is_finished_by_the_next_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old = recorded(tmp_path, 0)
+    recorded(tmp_path, 1)
+    rmdir = Path.rmdir
+
+    def killed(folder: Path) -> None:
+        if folder.name == old.name and not segments(old):
+            raise KeyboardInterrupt
+        rmdir(folder)
+
+    monkeypatch.setattr(Path, "rmdir", killed)
+    with pytest.raises(KeyboardInterrupt):
+        thin_oldest(tmp_path, "bench1", 1.0, 0.0, now=NOW)
+    monkeypatch.undo()
+    assert list(old.iterdir()) == []
+    assert thin_oldest(tmp_path, "bench1", 1.0, 0.0, now=NOW).session == ""
+    assert not old.exists()
+    assert figures(tmp_path) == [("samples.position", 64), ("theta1", 63)]
+
+
 def segments(folder: Path) -> list[Path]:
     return sorted(folder.glob("*.mcap"))
 

@@ -14,7 +14,9 @@ from pathlib import Path
 from rigwatch.archive.catalogue import Catalogue, load
 from rigwatch.archive.entry import Entry, entries
 from rigwatch.archive.indexing import index, outside_index
+from rigwatch.archive.one_writer import one_writer
 from rigwatch.archive.retention.retain import old_of, retain
+from rigwatch.archive.retention.thinning import finish_thinning
 from rigwatch.archive.store import Store
 from rigwatch.recorder import expired, newest, sessions_of
 from rigwatch.wire.rig_config import RecorderSection
@@ -59,6 +61,7 @@ def thin_oldest(
     """
     store = Store(str(folder))
     store.check()
+    _finish(store)
     now = now or datetime.now(UTC)
     rules = RecorderSection(keep_days=days, keep_alarm_days=alarm_days)
     current = newest(folder, rig).name
@@ -78,6 +81,13 @@ def thin_oldest(
         if done.removed:
             return Thinned(entry.name, entry.size, tuple(failures))
     return Thinned("", 0, tuple(failures))
+
+
+def _finish(store: Store) -> None:
+    """Remove what a kill has left of a session that is thinned, if only its empty folder."""
+    if any(row.get("going") for row in load(store).sessions.values()):
+        with one_writer(store):
+            finish_thinning(store, load(store), outside_index(store))
 
 
 def _soonest(days: float, alarm_days: float) -> float:
