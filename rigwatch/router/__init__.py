@@ -1,4 +1,4 @@
-"""The router of a rig as a process; with keys it follows the register and counts who is refused.
+"""The router of a rig as a process; it counts who is refused, and with keys follows the register.
 
 register.json ──changed──▶ Zenoh's router is opened again with the new access list
 Zenoh's log ──▶ RefusalLog ──▶ health, event `ACCESS REFUSED`

@@ -95,8 +95,7 @@ def run(config: RigConfig, stop: threading.Event) -> None:
     """
     use_few_pools()
     refusals = RefusalLog()
-    if config.bus.security.keys:
-        refusals.open()
+    refusals.open()
     try:
         _route(config, refusals, stop)
     finally:
@@ -106,8 +105,7 @@ def run(config: RigConfig, stop: threading.Event) -> None:
 def _route(config: RigConfig, refusals: RefusalLog, stop: threading.Event) -> None:
     heartbeat, report = Heartbeat("router"), RouterReport(config, refusals, stop)
     router = FollowedRouter(config)
-    if config.bus.security.keys:
-        report.start()
+    report.start()
     keep_memory_tidy(stop)
     heartbeat.ready(f"listens at {config.bus.listen}")
     # Samples do not pass through this loop.

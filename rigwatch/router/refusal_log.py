@@ -1,27 +1,36 @@
 """Counts refused connections and messages in Zenoh's log, which is the only place that shows them.
 
-The process's standard output is led through a pipe. Lines about refusals are counted and removed;
-everything else is passed on. The pipe is emptied whatever becomes of the output: Zenoh waits while
-it is full, and with it all that the router forwards.
+The process's standard output is led through a pipe. Lines about refusals are counted and removed,
+lines about links in order are removed, and everything else is passed on. The pipe is emptied
+whatever becomes of the output: Zenoh waits while it is full, and with it all that the router
+forwards.
 """
 
 import fcntl
 import os
 import threading
 
-from rigwatch.wire.bus import DENIED_MARK, REFUSED_MARK, log_refusals
+from rigwatch.wire.bus import (
+    DENIED_MARK,
+    LINK_MARK,
+    REFUSED_MARK,
+    SILENT_MARK,
+    log_refusals,
+)
 from rigwatch.wire.host import Printer
 
 PIPE_BYTES = 1 << 20
 LONGEST_LINE = 1 << 16
 _STDOUT = 1
+_DENIED, _REFUSED, _IN_ORDER, _OTHER = range(4)
 
 
 class RefusalLog:
     """The refusals since the start; opened once per process.
 
     Attributes:
-        connections: connections without a valid certificate of the rig's authority.
+        connections: connections that did not say who they are in time, or, with keys, without a
+            valid certificate of the rig's authority.
         messages: messages, queries and declarations that the access list or the size limit denied.
     """
 
@@ -67,14 +76,20 @@ class RefusalLog:
         *lines, self._rest = (self._rest + chunk).split(b"\n")
         if len(self._rest) > LONGEST_LINE:
             lines, self._rest = [*lines, self._rest], b""
-        denied = sum(DENIED_MARK in line for line in lines)
-        refused = sum(REFUSED_MARK in line for line in lines)
-        self.messages += denied
-        self.connections += refused
-        if denied + refused == len(lines):
-            return b""
-        others = (line for line in lines if DENIED_MARK not in line and REFUSED_MARK not in line)
+        kinds = [_kind(line) for line in lines]
+        self.messages += kinds.count(_DENIED)
+        self.connections += kinds.count(_REFUSED)
+        others = (line for line, kind in zip(lines, kinds, strict=True) if kind == _OTHER)
         return b"".join(line + b"\n" for line in others)
+
+
+def _kind(line: bytes) -> int:
+    """What a line of the log is about."""
+    if DENIED_MARK in line:
+        return _DENIED
+    if REFUSED_MARK in line or SILENT_MARK in line:
+        return _REFUSED
+    return _IN_ORDER if LINK_MARK in line and b"DEBUG" in line else _OTHER
 
 
 def _unprinted(count: int) -> str:

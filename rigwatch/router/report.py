@@ -34,7 +34,7 @@ class RouterReport:
     """Publishes the figures of the router from a thread of its own, as a client of the router.
 
     Args:
-        config: the rig's configuration, with keys.
+        config: the rig's configuration.
         refusals: the counter.
         stop: ends the thread.
     """
@@ -81,11 +81,12 @@ class RouterReport:
 
     def _endings(self, now: float, t_ns: int) -> Iterator[Event]:
         """Look when the certificates end, and warn of those that end soon."""
-        if now - self._looked_at < BETWEEN_LOOKS:
+        keys = self._config.bus.security.keys
+        if not keys or now - self._looked_at < BETWEEN_LOOKS:
             return
         self._looked_at = now
         with contextlib.suppress(KeysError):  # the follower of the register reports it
-            register = read_register(Path(self._config.bus.security.keys))
+            register = read_register(Path(keys))
             today = datetime.fromtimestamp(t_ns / 1e9, UTC).date()
             left = [days_left(one, today) for one in in_force(register)]
             self._days = float(min(left, default=math.inf))

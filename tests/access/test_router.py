@@ -1,7 +1,9 @@
 """The router of a rig with keys follows the register, and counts what it refuses."""
 
+import contextlib
 import os
 import shutil
+import socket
 import subprocess
 import sys
 import threading
@@ -14,12 +16,21 @@ import pytest
 from rigwatch.keys import Authority
 from rigwatch.router import RefusalLog
 from rigwatch.router.report import RouterReport
-from rigwatch.wire.bus import DENIED_MARK, REFUSED_MARK, Bus, connect, open_router
+from rigwatch.wire.bus import (
+    DENIED_MARK,
+    LINK_MARK,
+    REFUSED_MARK,
+    SILENT_MARK,
+    Bus,
+    connect,
+    open_router,
+)
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.errors import BusError, KeysError
 from rigwatch.wire.messages import ALARMS, COMMANDS, EVENTS, HEALTH, AlarmCommand, encode
 from rigwatch.wire.rig_config import load_rig
 from tests.access.secured_rig import SecuredRig, make_keys
+from tests.bus.rig import TestRig
 from tests.bus.test_complete_subscription import alarm
 from tests.waiting import PATIENCE, eventually
 
@@ -108,6 +119,37 @@ def test_refused_connections_and_denied_messages_are_counted_and_reported(
     eventually(lambda: any(e.code == "ACCESS REFUSED" for e in events.drain()), "an event")
 
 
+@pytest.mark.parametrize("keys", [False, True])
+def test_silent_connections_are_counted_and_reported(tmp_path: Path, *, keys: bool) -> None:
+    made = SecuredRig(tmp_path, make_keys(tmp_path / "keys")) if keys else TestRig(tmp_path)
+    with made as rig, contextlib.ExitStack() as lines:
+        rig.router()
+        observer = rig.bus("recorder")
+        healths, events = observer.subscribe(HEALTH), observer.subscribe(EVENTS)
+
+        def refused() -> float:
+            found = [
+                h.counters["refused_connections"] for h in healths.drain() if h.source == "router"
+            ]
+            return found[-1] if found else -1.0
+
+        before = -1.0
+
+        def reported() -> bool:
+            nonlocal before
+            before = refused()
+            return before >= 0
+
+        eventually(reported, "the router reports")
+        for number in range(4):
+            line = socket.create_connection(("127.0.0.1", rig.listen), 5.0)
+            lines.enter_context(line)
+            if number == 3 and not keys:
+                line.sendall(b"GET / HTTP/1.0\r\n\r\n")
+        eventually(lambda: refused() == before + 4, "each is counted, and no other")
+        eventually(lambda: any(e.code == "ACCESS REFUSED" for e in events.drain()), "an event")
+
+
 def test_certificates_that_end_are_told_once_a_day_from_a_month_before(tmp_path: Path) -> None:
     keys = make_keys(tmp_path / "keys")
     config = SecuredRig(tmp_path, keys).config
@@ -128,10 +170,11 @@ def test_certificates_that_end_are_told_once_a_day_from_a_month_before(tmp_path:
 def test_the_log_of_refusals_passes_everything_else_on() -> None:
     log = RefusalLog()
     lines = [b"WARN " + REFUSED_MARK + b": eof", b"something else", b"x " + DENIED_MARK, b"last"]
+    lines[1:1] = [b"DEBUG " + LINK_MARK + b": New transport", b"DEBUG " + LINK_MARK + SILENT_MARK]
     text = b"\n".join(lines) + b"\n"
     passed = b"".join(log.take(text[i : i + 7]) for i in range(0, len(text), 7))
     assert passed == b"something else\nlast\n"
-    assert (log.connections, log.messages) == (1, 1)
+    assert (log.connections, log.messages) == (2, 1)
     passed = log.take(b"y" * 70_000)
     assert len(passed) == 70_001
 

@@ -51,7 +51,14 @@ from rigwatch.wire.bus.message_ring import LARGEST_NUMBERED, SAID_KEY
 from rigwatch.wire.bus.ring_questions import RingQuestions
 from rigwatch.wire.bus.subscription import MOST_COMMANDS, QUEUE_CAPACITY, Subscription
 from rigwatch.wire.bus.tokens import sender_named
-from rigwatch.wire.bus.transport import DENIED_MARK, MAX_PAYLOAD, REFUSED_MARK, Close
+from rigwatch.wire.bus.transport import (
+    DENIED_MARK,
+    LINK_MARK,
+    MAX_PAYLOAD,
+    REFUSED_MARK,
+    SILENT_MARK,
+    Close,
+)
 
 __all__ = [
     "DENIED_MARK",
@@ -59,12 +66,14 @@ __all__ = [
     "DEVICE_RUN_KEY",
     "KEY",
     "LARGEST_NUMBERED",
+    "LINK_MARK",
     "MAX_PAYLOAD",
     "MOST_COMMANDS",
     "PATIENCE",
     "QUEUE_CAPACITY",
     "REFUSED_MARK",
     "SAID_KEY",
+    "SILENT_MARK",
     "Bus",
     "Close",
     "CommandAnswer",

@@ -12,6 +12,10 @@ LEASE = 10.0
 
 REFUSED_MARK, DENIED_MARK = b"zenoh_link_tls::unicast", b"Msg intercepted!"
 """In each line of Zenoh's log about a refused connection, and about a denied message."""
+SILENT_MARK = b"Failed to accept link before deadline"
+"""In its line about a connection that was closed since it did not say who it is."""
+LINK_MARK = b"zenoh_transport::unicast::manager"
+"""In that and all other lines of the same part of Zenoh, which are about links in order."""
 
 Close = Callable[[], None]
 Receive = Callable[[bytes, str, bytes], None]

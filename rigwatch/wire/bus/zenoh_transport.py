@@ -66,7 +66,7 @@ ATTEMPT_MS = 300
 """Time of one connection attempt [ms]; short, since signals are handled only between attempts."""
 _INTERCEPTORS = "zenoh::net::routing::interceptor"
 _LOGGED = (
-    "zenoh=error,zenoh_link_tls=warn,"
+    "zenoh=error,zenoh_link_tls=warn,zenoh_transport::unicast::manager=debug,"
     f"{_INTERCEPTORS}=trace,{_INTERCEPTORS}::access_control=off,{_INTERCEPTORS}::low_pass=off"
 )
 
