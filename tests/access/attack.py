@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from daq.known_device import read_devices
 from rigwatch.wire.bus import DEVICE_KEY, DEVICE_RUN_KEY, MAX_PAYLOAD, Bus
 from rigwatch.wire.bus import KEY as MODEL_KEY
 from rigwatch.wire.delivery import SampleReader
@@ -38,7 +39,7 @@ from rigwatch.wire.messages import (
 )
 from tests.access.rogue import ALLOWED_SAID, BOOT
 from tests.access.secured_rig import SecuredRig, make_keys
-from tests.bus.publisher import wave
+from tests.bus.publisher import DEVICE, wave
 from tests.bus.rig import TestRig
 from tests.monitor_process.model import monitor_section
 from tests.waiting import eventually
@@ -49,6 +50,8 @@ MARK = b"\x01" * 16
 FOR_OPERATORS = (MODEL_KEY, "monitor/receiver", DEVICE_KEY, DEVICE_RUN_KEY, PAST_KEY)
 NUMBERED = tuple(topic.key for topic in TOPICS if topic.numbered)
 OF_RECORDERS = ("run", "health/recorder", "gaps/recorder")
+RECEIVERS = ("monitor", "witness", "daq/rig")
+"""Processes that receive commands: about models and alarms, the witness's own alarm, the device."""
 DROPPED = ("rejected", "foreign_samples", "duplicate_samples")
 """Counters of the monitor for what it does not take for samples of its rig."""
 PACE_S = 0.0005
@@ -63,12 +66,12 @@ class Outcome:
         sent: messages and queries by what becomes of them: "denied" by the router, "allowed",
             "asked", a "command", "samples" (each of them) or what is "numbered", which a process
             has to refuse.
-        denied, refused: as counted by the router, and by monitor and witness.
+        denied, refused: as counted by the router, and by those who receive commands.
         dropped: payloads and samples that the monitor has not taken for samples of its rig.
         foreign: alarms, estimates and model changes that the recorder has not taken.
         samples, wrong: samples delivered to a reader, and those that differ from the real ones.
         ended: processes that ended.
-        changes: model changes, changed model files and alarms by an operator.
+        changes: model changes, changed files of model and device, and alarms by an operator.
         connections, refused_connections: attempts without a certificate, and those counted.
     """
 
@@ -103,6 +106,7 @@ class Attacked:
         else:
             self.rig = TestRig(folder, f'{section}[bus.security]\nsecret = "{folder}/own/secret"\n')
         self.model = folder / "model.toml"
+        self._device_file = folder / "device.json"
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
         self.outcome = Outcome()
         self.newest: Counter[str] = Counter()
@@ -126,7 +130,7 @@ class Attacked:
         self._healths = self.observer.subscribe(HEALTH)
         # A topic without a subscriber: the sender itself drops its messages.
         self._others = [self.observer.subscribe_lossy(topic) for topic in (EVENTS, GAPS, RUN)]
-        self.processes["daq"] = rig.publisher(BOOT, "--wave")
+        self.processes["daq"] = rig.publisher(BOOT, "--wave", "--desk", str(self._device_file))
         self._reader = SampleReader(self.observer)
         self.clients = [rig.bus(name) for name in STRANGERS]
         if not self.keys:
@@ -138,7 +142,7 @@ class Attacked:
         eventually(lambda: self.outcome.samples > 0, "samples")
         if self.keys:
             eventually(lambda: "router denied_messages" in self.newest, "the router's figures")
-        for process in ("monitor", "witness"):
+        for process in RECEIVERS:
             name = f"{process} commands_refused"
             eventually(lambda n=name: n in self.newest, f"the figures of the {process}")  # type: ignore[misc]
         eventually(lambda: "recorder foreign_messages" in self.newest, "those of the recorder")
@@ -204,6 +208,8 @@ class Attacked:
             outcome.changes.append("model file")
         journal = (self.rig.folder / "alarms.jsonl").read_text().splitlines()
         outcome.changes += [n for n in map(_operator, journal) if n]
+        if [met.identity for met in read_devices(self._device_file)] != [DEVICE]:
+            outcome.changes.append("device")
         outcome.denied = self.newest["router denied_messages"]
         outcome.refused_connections = self.newest["router refused_connections"]
         outcome.refused = self._counted("commands_refused", "commands_lost")
@@ -213,8 +219,8 @@ class Attacked:
         return outcome
 
     def _counted(self, *names: str) -> float:
-        """Sum of counters of the monitor and, for commands about its alarm, of the witness."""
-        return sum(self.newest[f"{who} {name}"] for who in ("monitor", "witness") for name in names)
+        """Sum of counters of those who receive commands."""
+        return sum(self.newest[f"{who} {name}"] for who in RECEIVERS for name in names)
 
     def _fate(self, client: Bus, how: str, key: str, payload: bytes) -> str:
         """What becomes of a message, by the access list or without one."""
@@ -223,8 +229,8 @@ class Attacked:
             return "denied"
         if self.keys and not _allowed_by_role(client, how, key):
             return "denied"
-        if key in (COMMANDS.key, MODEL_KEY):
-            return "command"
+        if key in (COMMANDS.key, MODEL_KEY) or (key == DEVICE_KEY and payload):
+            return "command"  # a request about the device without content asks which it is
         if how == "ask":
             return "asked"
         if key in NUMBERED:

@@ -6,10 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from rigwatch.wire.bus import DEVICE_KEY, DeviceReply
 from rigwatch.wire.bus import KEY as MODEL_KEY
+from rigwatch.wire.typed_files import json_value
 from tests.access.answer_times import KEYS, asked, questions
 from tests.access.attack import Attacked, attacked
 from tests.access.rogue import ASKED, KINDS, NAMED, SAID, everything, kinds
+from tests.bus.publisher import OTHER
 from tests.waiting import eventually
 
 LONGEST_S, ATTEMPTS = 0.1, 3
@@ -64,6 +67,8 @@ def test_every_queryable_answers_or_refuses_within_100_ms(rig: Attacked) -> None
             if all(taken >= LONGEST_S for taken in times):
                 slow[key, number] = question
     assert slow == {}
+    accepted = asked(bus, DEVICE_KEY, b"")[1]
+    assert [json_value(answer, DeviceReply).known for answer in accepted] == [OTHER]
     promoted = asked(bus, MODEL_KEY, next(questions(MODEL_KEY, rig.model)))[1]
     assert [b"in force" in answer for answer in promoted] == [True]
     assert [process.poll() for process in processes] == [None] * len(processes)
