@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from rigwatch.structures.live.live_watch import LiveDamage, LiveSettings, Said
+from rigwatch.structures.live.process import PROCESS, StructureProcess
 from rigwatch.structures.model.checks import load_structure
 from rigwatch.structures.records.record import Record
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.delivery.ring import SampleRing
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.messages.message_types import Alarm, Column, EstimateBlock, Event, SampleBlock
@@ -114,6 +116,31 @@ def test_what_cannot_be_watched_is_reported(damaged: Record) -> None:
     assert [m.code for m in told] == ["NOT WATCHED"]
 
 
+def test_health_says_whether_the_structure_is_watched(damaged: Record) -> None:
+    still = Record(0.01, {n: np.zeros(400) for n in damaged.columns})
+    for record, before, after, why in (
+        (still, "running", "unwatched", "kabe-antenna: found no undamaged sensor"),
+        (damaged, "running", "unwatched", "a damage was named"),
+        (kabe_record([], 0.05), "running", "running", ""),
+    ):
+        network = MemoryNetwork()
+        live = LiveDamage(load_structure(KABE), 0.01, LiveSettings())
+        process = StructureProcess(network.bus("bench", PROCESS), live, 0)
+        daq, healths = network.bus("bench", "daq"), network.bus("bench", "eye").subscribe(HEALTH)
+        process.turn(0.0)
+        for part in cuts(record, 50):
+            daq.publish(SAMPLES, part)
+            process.turn(0.0)
+        process._told = 0.0
+        process.turn(0.0)
+        told = healths.drain()
+        assert [told[0].state, told[-1].state] == [before, after]
+        assert told[-1].text.startswith(why)
+        process.close()
+        live.update(block(record, 0, 10, boot=8))
+        assert live.idle == "", "a restart begins anew"
+
+
 def test_a_process_on_a_real_bus_says_the_same(tmp_path: Path, damaged: Record) -> None:
     expected = watched(cuts(damaged, 10))
     with TestRig(tmp_path) as rig:
@@ -125,7 +152,10 @@ def test_a_process_on_a_real_bus_says_the_same(tmp_path: Path, damaged: Record) 
         daq = rig.bus("daq")
         ring = SampleRing(daq, 4096)
         rig.start("-m", "rigwatch", "structure", "watch", str(KABE), str(rig.path), "--known")
-        eventually(lambda: bool(heard[HEALTH].drain()), "the structure is watched")
+        healths = heard[HEALTH]
+        eventually(
+            lambda: any(h.source == PROCESS for h in healths.drain()), "the structure is watched"
+        )
         for part in cuts(damaged, 10):
             ring.add(part)
             daq.publish(SAMPLES, part)

@@ -47,6 +47,7 @@ Said = EstimateBlock | Alarm | Event
 
 ALARM, SOURCE = "structure_damage", "structure"
 CAUSE = "the structure does not move as the undamaged one would"
+NAMED = "a damage was named: nothing is watched until the device restarts"
 GUIDANCE = "Unload the structure and inspect it. The event DAMAGE names the place within seconds."
 
 
@@ -90,6 +91,12 @@ class LiveDamage:
         self._learnt = max(1, round(settings.undamaged / dt))
         self._loads = [load.channel for load in structure.loads.values() if load.channel]
         self._boot: int | None = None
+        self._idle = ""
+
+    @property
+    def idle(self) -> str:
+        """Why nothing is watched until the device restarts; empty while it is, or is learnt."""
+        return self._idle
 
     def prepare(self) -> None:
         """Compile the kernels that the first samples need; the state is unchanged."""
@@ -124,7 +131,7 @@ class LiveDamage:
         self._record = GrowingRecord(self._dt, self._structure.signals, self._loads)
         self._moving = self._settings.moving or block.seq > 0
         self._stage: Literal["learning", "watching", "gathering", "reported"] = "learning"
-        self._done = 0
+        self._done, self._idle = 0, ""
 
     def _messages(self) -> list[Said]:
         messages, rows, begin = list[Said](), list[FloatArray](), self._done
@@ -152,8 +159,8 @@ class LiveDamage:
                 moving=self._moving,
             )
         except ModelError as error:
-            self._stage = "reported"
-            return [self._event(row, "error", "NOT WATCHED", str(error))]
+            self._stage, self._idle = "reported", str(error)
+            return [self._event(row, "error", "NOT WATCHED", self._idle)]
         self._beside = _UndamagedRun(base, settings, self._dt, self._structure.signals)
         self._stage = "watching"
         severity: Severity = "warning" if base.unjudged else "info"
@@ -168,7 +175,7 @@ class LiveDamage:
             self._stage, self._alarm = "gathering", row
             return [self._raised(row)]
         if self._stage == "gathering" and (row - self._alarm) * self._dt >= self._settings.settle:
-            self._stage = "reported"
+            self._stage, self._idle = "reported", NAMED
             return [self._event(row, "critical", "DAMAGE", self._place(row))]
         return []
 

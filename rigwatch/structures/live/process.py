@@ -56,8 +56,10 @@ class StructureProcess:
 
     def _health(self) -> Health:
         counters = {"delivered": float(self.reader.counters.delivered)}
-        state = "unsuitable" if self._unsuitable else "running"
-        return Health(PROCESS, time.time_ns(), state, self._unsuitable, counters)
+        # What stays unwatched is not told as running, however well the process runs.
+        idle = self._watched.idle
+        state = "unsuitable" if self._unsuitable else "unwatched" if idle else "running"
+        return Health(PROCESS, time.time_ns(), state, self._unsuitable or idle, counters)
 
 
 def watch_rig(config: RigConfig, watched: LiveDamage) -> None:
