@@ -178,11 +178,20 @@ class Journal:
             if (found := self.get(path)) is not None:
                 yield found
 
-    def finish(self, paths: Iterable[str]) -> None:
-        """Write the results of these units alone, in the given order, in place of the journal."""
+    def finish(self, paths: Sequence[str]) -> None:
+        """Write all results in place of the journal, ordered by path.
+
+        Those of other units, which an earlier run has worked on, stay. A unit that has another
+        path now does not stand there twice.
+
+        Args:
+            paths: the units of this run, in their order, which is kept if there are no others.
+        """
         if self.file is None:
             return
-        lines = (self._at(self._lines[path]) for path in paths if path in self._lines)
+        others = self._others(paths)
+        order = sorted({*paths, *others}) if others else paths
+        lines = (self._at(self._lines[path]) for path in order if path in self._lines)
         beside = journal_of(self.file)
         temporary = self.file.with_name(f".{self.file.name}.new")
         if self.file.suffix == PARQUET:
@@ -193,6 +202,15 @@ class Journal:
         _replace(temporary, self.file)
         if beside != self.file:
             beside.unlink()
+
+    def _others(self, paths: Sequence[str]) -> list[str]:
+        """Units that are none of these, however their paths are written."""
+        own = set(paths)
+        if own.issuperset(self._lines):
+            return []
+        places = {os.path.realpath(path) for path in paths}
+        further = (path for path in self._lines if path not in own)
+        return [path for path in further if os.path.realpath(path) not in places]
 
     def _at(self, place: _Place) -> bytes:
         at, length, _ = place

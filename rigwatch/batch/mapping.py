@@ -24,16 +24,17 @@ from rigwatch.version import __version__
 
 
 class Results:
-    """Outcomes in the order of their paths.
+    """Outcomes of a run in the order of their paths.
 
     Attributes:
-        file: the file that holds them, None if they are in memory.
+        file: the file that holds them, and maybe those of other units; None if they are in memory.
         done: number of results.
         failed: number of failures, by the kind of error.
     """
 
     def __init__(self, journal: Journal, paths: list[str]) -> None:
         self.file = journal.file
+        self._paths = frozenset(paths)
         self._kept = None if self.file else list(journal.outcomes(paths))
         found = Counter(journal.kinds(paths))
         self.done = found.pop("", 0)
@@ -50,7 +51,7 @@ class Results:
         if self._kept is not None:
             yield from self._kept
         elif self.file is not None:
-            yield from read_outcomes(self.file)
+            yield from (one for one in read_outcomes(self.file) if one.path in self._paths)
 
     def failures(self) -> Iterator[Outcome]:
         """The units without a result."""

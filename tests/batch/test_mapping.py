@@ -98,6 +98,30 @@ def test_only_new_and_changed_recordings_are_worked_on(tmp_path, ending):
     assert target.read_bytes() == whole.read_bytes()
 
 
+@pytest.mark.parametrize("ending", ["jsonl", "parquet"])
+def test_a_run_with_a_part_of_the_recordings_keeps_the_results_of_the_others(tmp_path, ending):
+    files, log = make_files(tmp_path / "sessions", 5), tmp_path / "log"
+    target, whole = tmp_path / f"out.{ending}", tmp_path / f"whole.{ending}"
+    (files / "run0004.mcap").write_text("broken")
+    rigwatch.map(counted, [files], results=target, log=str(log))
+    log.write_text("")
+    (files / "run0003.mcap").write_text("33")
+    part = [files / "run0003.mcap", files / "run0001.mcap"]
+    found = rigwatch.map(counted, part, results=target, log=str(log))
+    assert log.read_text().split() == ["run0003.mcap"]
+    assert [Path(path).name for path, _ in found] == ["run0001.mcap", "run0003.mcap"]
+    assert (found.done, found.failed, list(found.failures())) == (2, {}, [])
+    log.write_text("")
+    rigwatch.map(counted, [files], results=target, log=str(log))
+    assert log.read_text().split() == ["run0004.mcap"], "only what had failed"
+    rigwatch.map(counted, [files], results=whole, log=str(log))
+    assert target.read_bytes() == whole.read_bytes()
+    rigwatch.map(counted, [files / ".." / "sessions"], results=target, log=str(log))
+    found = rigwatch.map(counted, [files], results=target, log=str(log))
+    assert (found.done, found.failed) == (4, {"ValueError": 1})
+    assert target.read_bytes() == whole.read_bytes(), "a recording by another path is the same"
+
+
 def test_failed_units_are_tried_again(files, tmp_path):
     target = tmp_path / "out.jsonl"
     rigwatch.map(sizes, [files], results=target)
