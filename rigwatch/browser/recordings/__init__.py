@@ -3,6 +3,7 @@
 from rigwatch.browser.recordings.channels import (
     channels_of,
     check_session,
+    known_channels,
     recordings_in,
     write_channels,
 )
@@ -28,6 +29,7 @@ __all__ = [
     "contents_of",
     "import_preview",
     "kept_uploads",
+    "known_channels",
     "make_study",
     "new_upload",
     "recordings_in",

@@ -15,6 +15,7 @@ from rigwatch.wire.ordering import elapsed_ns
 from rigwatch.wire.session import SUFFIX, open_session
 
 MOST = 500
+Shown = tuple[Results, dict[str, Any]]
 _WRITING = threading.Lock()
 
 
@@ -24,20 +25,31 @@ def recordings_in(root: Path) -> list[str]:
     return sorted(path.relative_to(root).as_posix() for path in found)[:MOST]
 
 
-def channels_of(root: Path, path: Path) -> tuple[Results, dict[str, Any]]:
+def channels_of(root: Path, path: Path) -> Shown:
     """Folder of a recording's chart data, and its channels; written if missing.
 
     Raises:
         RigwatchError: the session cannot be read.
     """
-    stat = path.stat()
-    key = f"{path}:{stat.st_ino}:{stat.st_size}:{stat.st_mtime_ns}"
-    kept = Results(root / RESULTS / hashlib.sha256(key.encode()).hexdigest()[:32])
+    kept = _kept(root, path)
     with _WRITING:  # two that wrote the same would take each other's files away
         if not kept.has("recording.json"):
             kept.write("recording", apart(write_channels, kept, path))
-    found: dict[str, Any] = kept.read("recording")
-    return kept, found
+    return kept, kept.read("recording")
+
+
+def known_channels(root: Path, path: Path) -> Shown | None:
+    """The same, if the recording has been read already; otherwise None."""
+    kept = _kept(root, path)
+    found = kept.read("recording")
+    return None if found is None else (kept, found)
+
+
+def _kept(root: Path, path: Path) -> Results:
+    """The folder for the chart data of a recording as it is now."""
+    stat = path.stat()
+    key = f"{path}:{stat.st_ino}:{stat.st_size}:{stat.st_mtime_ns}"
+    return Results(root / RESULTS / hashlib.sha256(key.encode()).hexdigest()[:32])
 
 
 def check_session(path: Path) -> None:

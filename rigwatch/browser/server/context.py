@@ -11,7 +11,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
 
 from rigwatch.browser.server.places import PlaceError, Places
-from rigwatch.browser.work import Desk, Desks
+from rigwatch.browser.work import Desk, Desks, Turns
 from rigwatch.wire.errors import RigwatchError, reason_of
 from rigwatch.wire.typed_files import JsonError, as_json, json_value
 
@@ -30,6 +30,7 @@ class Context:
     Attributes:
         places: the folder.
         desks: the studies' processes.
+        reading: turns of those who read whole files.
         rig: configuration of a rig, None without one.
         most_upload: largest upload of a recording [bytes].
         stopping: set when the server is about to stop.
@@ -37,6 +38,7 @@ class Context:
 
     places: Places
     desks: Desks = field(default_factory=Desks)
+    reading: Turns = field(default_factory=Turns)
     rig: Path | None = None
     most_upload: int = 1 << 30
     stopping: asyncio.Event = field(default_factory=asyncio.Event)

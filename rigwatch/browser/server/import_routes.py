@@ -16,6 +16,7 @@ from rigwatch.browser.recordings import (
     check_session,
     contents_of,
     import_preview,
+    known_channels,
     make_study,
     new_upload,
     recordings_in,
@@ -40,6 +41,8 @@ from rigwatch.wire.errors import ImportDataError, RigwatchError
 from rigwatch.wire.exchange import ImportMapping, import_file
 from rigwatch.wire.session import SUFFIX
 
+MOST_PREVIEW = 64 << 20
+"""Largest file of which a preview is made [bytes]: an import reads any, in the same time, once."""
 OWN = "own:"
 """Start of the name of an own model that a study begins with."""
 
@@ -68,18 +71,19 @@ async def bring(request: Request) -> Response:
     if not await _written(request, path, most):
         return refused(f"found more than {most >> 20} MB, expected less", 413)
     try:
-        return answer({"upload": f"{folder.name}/{name}", "look": await _contents(path)})
+        look = await _contents(context, path)
+        return answer({"upload": f"{folder.name}/{name}", "look": look})
     except RigwatchError as error:
         _gone(path)
         raise ImportDataError(str(error).replace(f"{path}", name)) from None
 
 
-async def _contents(path: Path) -> Any:
+async def _contents(context: Context, path: Path) -> Any:
     """Content of an uploaded file; None for a session, which needs no mapping."""
     if path.suffix == SUFFIX:
-        await run_in_threadpool(apart, check_session, path)
+        await context.reading.run(apart, check_session, path)
         return None
-    return await run_in_threadpool(apart, contents_of, path)
+    return await context.reading.run(apart, contents_of, path)
 
 
 async def _written(request: Request, path: Path, most: int) -> bool:
@@ -120,7 +124,7 @@ async def take_in(request: Request) -> Response:
         return answer({"recording": context.places.relative(target), "remarks": []})
     mapping = _mapping(wanted.get("mapping"))
     try:
-        made = await run_in_threadpool(apart, import_file, source, target, mapping)
+        made = await context.reading.run(apart, import_file, source, target, mapping)
     except RigwatchError as error:
         # Nothing is left of it; what stands there another request has brought meanwhile.
         raise ImportDataError(str(error).replace(str(source), source.name)) from None
@@ -140,8 +144,11 @@ async def preview(request: Request) -> Response:
     context, wanted = context_of(request), await body_of(request)
     source = _uploaded(context, wanted)
     mapping = _mapping(wanted.get("mapping"))
+    if (size := source.stat().st_size) > MOST_PREVIEW:
+        found = f"found {size >> 20} MB, expected at most {MOST_PREVIEW >> 20} MB"
+        raise ImportDataError(f"{source.name}: {found} for a preview: import it without one")
     try:
-        return answer(await run_in_threadpool(apart, import_preview, source, mapping))
+        return answer(await context.reading.run(apart, import_preview, source, mapping))
     except RigwatchError as error:
         raise ImportDataError(str(error).replace(str(source), source.name)) from None
 
@@ -183,11 +190,12 @@ async def recording_signals(request: Request) -> Response:
 
 
 async def _channels(request: Request) -> Any:
-    places = context_of(request).places
-    path = places.inside(request.path_params["file"])
+    context = context_of(request)
+    root, path = context.places.root, context.places.inside(request.path_params["file"])
     if path.suffix != SUFFIX or not path.is_file():
         raise PlaceError(f"{path.name}: no recording")
-    return await run_in_threadpool(channels_of, places.root, path)
+    known = await run_in_threadpool(known_channels, root, path)
+    return known or await context.reading.run(channels_of, root, path)
 
 
 async def template(request: Request) -> Response:

@@ -1,6 +1,6 @@
 """Long tasks on studies: one process per study, results on disk, cancelling at any time."""
 
-from rigwatch.browser.work.apart import ApartError, apart
+from rigwatch.browser.work.apart import ApartError, Turns, apart
 from rigwatch.browser.work.desk import Desk, Desks, Job, Told
 from rigwatch.browser.work.directions import Directions
 from rigwatch.browser.work.rehearsal import model_in_force
@@ -17,6 +17,7 @@ __all__ = [
     "Job",
     "Results",
     "Told",
+    "Turns",
     "apart",
     "model_in_force",
     "results_of",

@@ -4,6 +4,7 @@ A text file of a gigabyte needs more than ten times as much memory as tables of 
 it holds the interpreter's lock for minutes.
 """
 
+import asyncio
 import contextlib
 import os
 import resource
@@ -19,11 +20,39 @@ from rigwatch.wire.host import end_with_parent
 
 MOST_MEMORY = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
 """Most memory of such a process: half of the machine's [bytes]."""
+MOST_WAITING = 8
+"""Requests that may wait until files of others are read."""
 _one_at_a_time = threading.Lock()
 
 
 class ApartError(RigwatchError):
     """A file that cannot be read, or not in the memory that is allowed."""
+
+
+class Turns:
+    """Lets requests read files one after the other: those that wait hold no thread of the server.
+
+    All pages share its threads, and a large file takes minutes.
+    """
+
+    def __init__(self) -> None:
+        self._turn = asyncio.Lock()
+        self._there = 0
+
+    async def run(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """What a function returns, called in a thread once it is its turn.
+
+        Raises:
+            ApartError: too many wait already.
+        """
+        if self._there > MOST_WAITING:
+            raise ApartError(f"{self._there} other files are to be read first, try again later")
+        self._there += 1
+        try:
+            async with self._turn:
+                return await asyncio.to_thread(function, *arguments)
+        finally:
+            self._there -= 1
 
 
 def apart(function: Callable[..., Any], *arguments: Any, memory: int = MOST_MEMORY) -> Any:
