@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 from rigwatch.browser.recordings import write_channels
 from rigwatch.browser.signals.pyramid import FIRST, HIGH, LAST, LOW, STEP, Pyramid
 from rigwatch.browser.signals.trace import Trace, open_trace, write_trace
-from rigwatch.browser.work import Results
+from rigwatch.browser.work import RESULTS, Results
 from rigwatch.wire.session import SessionWriter, run_info
+from tests.browser.page import serving
+from tests.browser.test_access import ask
 from tests.bus.publisher import wave
 
 
@@ -94,3 +96,27 @@ def test_a_clock_that_was_set_in_a_recording_does_not_turn_its_chart(tmp_path, b
     trace = open_trace(kept.folder / "signals", next(iter(found["channels"])))
     times, _ = trace.between(*trace.ends, 4000)
     assert np.all(np.diff(times) >= 0.0)
+
+
+def test_a_channel_that_is_not_there_is_no_fault_of_the_server(tmp_path):
+    (tmp_path / "one").mkdir()
+    (tmp_path / "one" / "study.toml").touch()
+    results = Results(tmp_path / "one" / RESULTS / "abc")
+    results.write("evidence", {"coulomb@load": {}, "later@load": {}})
+    times, values = np.arange(100) / 10.0, np.ones((2, 100), np.float32)
+    with results.whole("signals") as folder:
+        write_trace(folder, "train.residual.x", values[0], times)
+    with results.whole("directions") as folder:
+        (folder / "labels.txt").write_text("coulomb@load")
+        for name, content in (("taken", values[None]), ("residual", values), ("scale", np.ones(2))):
+            np.save(folder / f"{name}.npy", content)
+        np.save(folder / "times.npy", times)
+    asked = (
+        "/api/signals/one?key=abc&chart=residual&use=train&channel=x&preview={}%40load&number={}"
+    )
+    with serving(tmp_path) as served:
+        found = [
+            ask(served, asked.format(label, number))[0]
+            for label, number in (("coulomb", 1), ("coulomb", 2), ("coulomb", -1), ("later", 0))
+        ]
+    assert found == [200, 404, 404, 404]

@@ -64,6 +64,8 @@ def _preview(results: Results, label: str, use: str, channel: str, number: int) 
         if use != "train" or not results.has("directions"):
             return None
     directions = _directions(results.folder / "directions", _made(results.folder / "directions"))
+    if label not in directions.labels or not 0 <= number < directions.channels:
+        raise PlaceError(f"{label[:LONGEST_KEY]!r} of channel {number}: no such line of this study")
     return directions.trace(label, number)
 
 

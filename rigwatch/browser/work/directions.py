@@ -59,6 +59,11 @@ class Directions:
         self._residual: FloatArray = np.load(folder / "residual.npy")
         self._scale: FloatArray = np.load(folder / "scale.npy")
 
+    @property
+    def channels(self) -> int:
+        """Number of channels."""
+        return len(self._residual)
+
     def left(self, label: str, channel: int) -> FloatArray:
         """The residual minus the part that the candidate explains, of one channel, shape (n,)."""
         taken = self._taken[self.labels.index(label), channel]
