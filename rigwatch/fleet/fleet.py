@@ -35,6 +35,7 @@ class Onlooker:
         self._last: dict[str, Health] = {}
         self._heard_at: dict[str, float] = {}
         self._hung: set[str] = set()
+        self._given_time: set[str] = set()
 
     def state(self) -> RigState:
         """The present state."""
@@ -83,18 +84,27 @@ class Onlooker:
         assert self._healths is not None
         now = time.monotonic()
         until = now + self._timeout
-        for name in present:
-            self._heard_at.setdefault(name, now)
+        for name in set(self._heard_at) - present:
+            del self._heard_at[name]  # its time begins anew when it comes back
+        self._give_time(present - set(self._heard_at), now)
         for health in self._healths.drain():
             self._take(health)
+        # Between two looks it may have been away, and have only just come back.
+        self._give_time(self._silent(present) - self._given_time, now)
         while present - set(self._last) and (left := until - time.monotonic()) > 0:
             if (health := self._healths.get(timeout=left)) is not None:
                 self._take(health)
+
+    def _give_time(self, names: set[str], now: float) -> None:
+        """Let the time begin in which a process has to say something, once until it does."""
+        self._heard_at |= dict.fromkeys(names, now)
+        self._given_time |= names
 
     def _take(self, health: Health) -> None:
         name = health.source.partition("/")[0]
         if name in self._heard_at or is_remembered(self._last, name):
             self._last[name], self._heard_at[name] = health, time.monotonic()
+            self._given_time.discard(name)
 
     def close(self) -> None:
         """Leave the rig's bus."""

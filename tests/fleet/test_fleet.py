@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from rigwatch.commands import main
-from rigwatch.fleet import Fleet, as_lines, as_page
-from rigwatch.fleet.fleet import Onlooker
+from rigwatch.fleet import Fleet, as_lines, as_page, fleet
+from rigwatch.fleet.fleet import SILENT_S, Onlooker
 from rigwatch.fleet.rig_state import GONE, UNREACHABLE, judged
 from rigwatch.wire.bus import Bus, connect, serve_alarm_list
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
@@ -67,6 +67,29 @@ def test_processes_that_are_made_up_are_bounded_and_those_of_the_rig_are_heard(t
     daq.publish(HEALTH, Health("daq/rig", 1, "reconnecting", "", {}))
     assert onlooker.state().state == "daq/rig: reconnecting"
     assert len(onlooker._last) == MOST_SOURCES + 1
+
+
+def test_a_process_that_has_just_come_back_does_not_hang(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    now = [100.0]
+    monkeypatch.setattr(fleet.time, "monotonic", lambda: now[0])
+    network = MemoryNetwork()
+    onlooker = Onlooker(tmp_path, load_rig(TestRig(tmp_path).path), 0.0)
+    monkeypatch.setattr(fleet, "connect", lambda *_: network.bus("r", "fleet"))
+    daq = network.bus("r", "daq")
+    onlooker.state()
+    for seen_away in (False, True):
+        daq.publish(HEALTH, Health("daq/rig", 1, "running", "", {}))
+        assert onlooker.state().hung == ()
+        daq.close()
+        if seen_away:
+            assert onlooker.state().missing == ("daq",)
+        now[0] += 10.0
+        daq = network.bus("r", "daq")
+        assert (onlooker.state().hung, onlooker.state().missing) == ((), ())
+        now[0] += SILENT_S + 0.1
+        assert onlooker.state().hung == ("daq",), "it has said nothing since"
 
 
 def test_a_monitor_that_does_not_tell_its_alarms_is_not_one_without_alarms(tmp_path: Path):
