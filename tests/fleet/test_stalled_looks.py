@@ -18,7 +18,7 @@ from rigwatch.browser.server.places import Places
 from rigwatch.fleet import RigState
 from rigwatch.wire.errors import BusError
 from tests.bus.rig import TestRig
-from tests.waiting import PATIENCE
+from tests.waiting import PATIENCE, eventually
 
 OLD_AFTER = 0.4
 Events = AsyncGenerator[bytes, None]
@@ -138,3 +138,74 @@ def test_figures_are_told_old_while_looks_stall_and_come_back_with_the_next_look
             await events.aclose()
 
     asyncio.run(watched())
+
+
+def test_a_look_at_the_rigs_that_fails_unexpectedly_is_told_once_and_the_next_one_made(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(event_streams, "OLD_AFTER", 0.1)
+    monkeypatch.setattr(fleet_pages, "BETWEEN", 0.02)
+    monkeypatch.setattr(fleet_pages, "STILL_EVERY", 0.05)
+    fails = threading.Event()
+    fails.set()
+
+    def look() -> list[RigState]:
+        if fails.is_set():
+            raise KeyError("left")
+        return [RigState("left", "left.toml", 0, "running")]
+
+    async def watched() -> None:
+        pages = FleetPages(look)
+        following = asyncio.create_task(pages.follow())
+        events = pages.events()
+        _, content = await told(events, "old")
+        assert isinstance(content, dict)
+        assert content["why"] == "the look at the rigs failed: KeyError: 'left'"
+        fails.clear()
+        while "rigs: 0 need" not in str(await told(events, "rigs")):
+            pass
+        await events.aclose()
+        following.cancel()
+        pages.dashboards.close()
+
+    asyncio.run(watched())
+    assert [one.getMessage() for one in caplog.records].count(
+        "the look at the rigs failed: KeyError: 'left'; it begins anew"
+    ) == 1
+
+
+def test_a_link_that_fails_unexpectedly_is_told_once_and_made_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    class Broken:
+        """A bus whose messages nobody foresaw."""
+
+        def subscribe(self, *_: object) -> None:
+            raise TypeError("no such message")
+
+        def close(self) -> None:
+            """Nothing to close."""
+
+    made: list[object] = []
+
+    def connect(*_: object) -> object:
+        made.append(None)
+        if len(made) > 3:
+            raise BusError("no router answers")
+        return Broken()
+
+    monkeypatch.setattr(link, "TIMEOUT", 0.05)
+    monkeypatch.setattr(link, "connect", connect)
+    found = RigLink(TestRig(tmp_path).path)
+    seen: set[object] = set()
+
+    def went_on() -> bool:
+        seen.add(found.status()["trouble"])
+        return "no router answers" in seen
+
+    eventually(went_on, "the link is made anew")
+    found.close()
+    failed = "the page's link to the rig failed: TypeError: no such message"
+    assert failed in seen
+    logged = [one.getMessage() for one in caplog.records]
+    assert logged.count(f"{failed}; it begins anew") == 1

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from monitor.model import load_model
+from rigwatch.browser.rig.faults import Faults
 from rigwatch.browser.rig.live_view import LiveView
 from rigwatch.wire.bus import (
     Bus,
@@ -48,6 +49,7 @@ class RigLink:
         self._trouble = "connecting to the rig"
         self.looked_at = time.monotonic()
         self._learns = _learns(path)
+        self._faults = Faults("the page's link to the rig")
         self._lock, self._ended = threading.Lock(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="rig", daemon=True)
         self._thread.start()
@@ -94,16 +96,22 @@ class RigLink:
     def _run(self) -> None:
         while not self._ended.is_set():
             try:
-                bus = connect(self.config, unique_process("workbench"), TIMEOUT)
+                self._joined()
+                continue
             except RigwatchError as error:  # no router, or keys that cannot be read
                 self._say(str(error))
-                self.looked_at = time.monotonic()
-                self._ended.wait(TIMEOUT)
-                continue
-            try:
-                self._listen(bus)
-            finally:
-                bus.close()
+            except Exception as error:  # the page goes on, whatever it is
+                self._say(self._faults.told(error))
+            self.looked_at = time.monotonic()
+            self._ended.wait(TIMEOUT)
+
+    def _joined(self) -> None:
+        """Listen until the router is gone."""
+        bus = connect(self.config, unique_process("workbench"), TIMEOUT)
+        try:
+            self._listen(bus)
+        finally:
+            bus.close()
 
     def _listen(self, bus: Bus) -> None:
         topics = (ALARMS, SAMPLES, ESTIMATES, HEALTH)

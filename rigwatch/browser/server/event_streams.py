@@ -31,16 +31,17 @@ STILL_HERE = event("still")
 that has gone is noticed."""
 
 
-def stalled(looked_at: float) -> bytes:
+def stalled(looked_at: float, why: str = "") -> bytes:
     """The event that says for how long no look has ended; empty while that is usual.
 
     Args:
         looked_at: end of the last look, monotonic time [s].
+        why: what is known of the cause.
     """
     silent = time.monotonic() - looked_at
     if silent <= OLD_AFTER:
         return b""
-    return event("old", msgspec.json.encode({"seconds": round(silent)}))
+    return event("old", msgspec.json.encode({"seconds": round(silent), "why": why}))
 
 
 def event_stream(request: Request, events: AsyncGenerator[bytes, None]) -> StreamingResponse:

@@ -14,6 +14,7 @@ from starlette.responses import HTMLResponse, PlainTextResponse, RedirectRespons
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
+from rigwatch.browser.rig import Faults
 from rigwatch.browser.server.access import Access, Guard
 from rigwatch.browser.server.application import STATIC, style
 from rigwatch.browser.server.context import NOT_KEPT
@@ -51,21 +52,26 @@ class FleetPages:
         self.dashboards = Dashboards()
         self._news = asyncio.Condition()
         self._looked_at = time.monotonic()
+        self._why, self._faults = "", Faults("the look at the rigs")
 
     async def follow(self) -> None:
         """Poll the rigs, and notify the open pages."""
         while True:
-            states = await asyncio.to_thread(self._poll)
-            async with self._news:
-                self.states, self._looked_at = states, time.monotonic()
-                self._news.notify_all()
+            try:
+                states = await asyncio.to_thread(self._poll)
+            except Exception as error:  # the pages go on, and say that their figures are old
+                self._why = self._faults.told(error)
+            else:
+                async with self._news:
+                    self.states, self._looked_at, self._why = states, time.monotonic(), ""
+                    self._news.notify_all()
             await asyncio.sleep(BETWEEN)
 
     async def events(self) -> AsyncGenerator[bytes, None]:
         """The rigs now, and whenever something has changed; how old they are if polls stall."""
         sent = b""
         while True:
-            if old := stalled(self._looked_at):
+            if old := stalled(self._looked_at, self._why):
                 sent = b""  # the next poll is sent whatever it shows
                 yield old
             else:

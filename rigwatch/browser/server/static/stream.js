@@ -28,7 +28,7 @@ export function listen(path, { kinds, heard, again = () => {}, told = banner }) 
     last = Date.now();
     for (const kind of kinds) on(kind, (content) => { say(""); heard(kind, content); });
     on("still", () => say(""));
-    on("old", ({ seconds }) => say(`no look for ${seconds} s: ${OLD}`));
+    on("old", ({ seconds, why }) => say(`no look for ${seconds} s: ${OLD}${why ? ` (${why})` : ""}`));
     source.addEventListener("error", () => { if (!words.startsWith("not connected")) say(`not connected since ${new Date().toLocaleTimeString()}: ${OLD}`); });
   };
   const close = () => { source?.close(); source = null; };
