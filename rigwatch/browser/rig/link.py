@@ -144,6 +144,7 @@ class RigLink:
             shelved = ask_shelf(bus, 0.3)
             with self._lock:
                 self._live.shelve(shelved)
+                self._live.only(standing)  # the monitor answers: its list is in it
 
     def _say(self, trouble: str) -> None:
         with self._lock:

@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.bus import ShelvedAlarm
 from rigwatch.wire.messages import (
+    STRUCTURE_DAMAGE,
     Alarm,
     EstimateBlock,
     Health,
@@ -51,6 +52,7 @@ class LiveView:
         self._count = 0
         self._units: dict[str, str] = {}
         self._alarms: dict[str, Alarm] = {}
+        self._missing: set[str] = set()
         self._health: dict[str, tuple[Health, float]] = {}
         self._figures: dict[str, float] = {}
         self._heard: dict[str, float] = {}
@@ -62,6 +64,20 @@ class LiveView:
             known = self._alarms.get(alarm.name)
             if known is None or known.t_ns <= alarm.t_ns:
                 remember(self._alarms, alarm)
+
+    def only(self, standing: list[Alarm]) -> None:
+        """Take it that the monitor has no others: those that it no longer lists have ended.
+
+        What ended while the link was down is told by nothing else. An alarm has to be missing in
+        two lists in a row, as one that is raised meanwhile may come before the list that has it.
+        """
+        listed = {alarm.name for alarm in standing}
+        known = {one.name for one in self._alarms.values() if one.state != "normal"}
+        missing = known - listed - {STRUCTURE_DAMAGE}
+        ended = missing & self._missing
+        for name in ended:
+            self._alarms[name] = replace(self._alarms[name], state="normal")
+        self._missing = missing - ended
 
     def shelve(self, shelved: list[ShelvedAlarm]) -> None:
         """Take the list of shelved alarms, which stand nowhere else."""
@@ -91,7 +107,8 @@ class LiveView:
         if kind == "estimates" and len(block):
             named = {column.name: column for column in columns}
             flags = [name for name in ("armed", "observable") if name in named]
-            self._figures = {name: float(named[name].values[-1]) for name in flags}
+            if flags:  # else they are of a structure, not of the monitor
+                self._figures = {name: float(named[name].values[-1]) for name in flags}
         shown = [c for c in columns if kind == "samples" or c.name in SHOWN_ESTIMATES]
         self._units |= {column.name: column.unit for column in shown}
         taken = slice(-block.seq % self._every, None, self._every)

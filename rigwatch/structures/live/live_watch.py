@@ -34,6 +34,7 @@ from rigwatch.structures.report import too_little, verdict
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.messages import (
+    STRUCTURE_DAMAGE,
     Alarm,
     Column,
     EstimateBlock,
@@ -45,7 +46,7 @@ from rigwatch.wire.messages import (
 
 Said = EstimateBlock | Alarm | Event
 
-ALARM, SOURCE = "structure_damage", "structure"
+SOURCE = "structure"
 CAUSE = "the structure does not move as the undamaged one would"
 NAMED = "a damage was named: nothing is watched until the device restarts"
 GUIDANCE = "Unload the structure and inspect it. The event DAMAGE names the place within seconds."
@@ -197,8 +198,9 @@ class LiveDamage:
     def _raised(self, row: int) -> Alarm:
         judge, at = self._beside.judge, int(self._record.t_ns[row])
         return Alarm(
-            ALARM, "unacknowledged", "critical", CAUSE, GUIDANCE, self._device, self._boot or 0,
-            self._first + row, at, judge.value, float("nan"), judge.threshold,
+            STRUCTURE_DAMAGE, "unacknowledged", "critical", CAUSE, GUIDANCE,
+            self._device, self._boot or 0, self._first + row, at,
+            judge.value, float("nan"), judge.threshold,
             first_out=True, user="", onset_seq=self._first + row + 1 - judge.zero,
         )  # fmt: skip
 

@@ -209,7 +209,10 @@ EVERY_ALARM = "*"
 LONGEST_NAME, LONGEST_TEXT = 100, 500
 """Longest names and text of a command that are kept [characters]."""
 MONITOR_STALE = "monitor_stale"
-"""The alarm that the witness raises, all others are the monitor's."""
+"""The alarm that the witness raises."""
+STRUCTURE_DAMAGE = "structure_damage"
+"""The alarm of a structure that is watched; it is in no list of standing alarms, all others are the
+monitor's."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,15 +2,17 @@
 
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from rigwatch.browser.rig.live_view import LiveView
 from rigwatch.browser.rig.promotions import can_roll_back, promotions
-from rigwatch.wire.messages import MOST_SOURCES, Health
+from rigwatch.wire.messages import MOST_SOURCES, STRUCTURE_DAMAGE, Health
 from tests.browser.page import Page, browser, looking, serving
 from tests.bus.rig import ROOT
+from tests.bus.test_complete_subscription import alarm
 from tests.workbench.rigs.test_rig_story import Shell, Watched
 
 ALARM = '[data-alarm="dry_friction"]'
@@ -133,6 +135,28 @@ def test_a_slow_rig_is_not_silent_between_two_samples() -> None:
     assert live.hears(25.0)
     assert live.states(25.0, 3.0)["why"] == ""
     assert not live.hears(31.0)
+
+
+def test_an_alarm_that_ended_while_the_link_was_down_does_not_stay() -> None:
+    live, names = LiveView(256.0), ("dry_friction", "stale", STRUCTURE_DAMAGE)
+    for name in names:
+        live.take(replace(alarm(0), name=name, state="unacknowledged"), 0.0)
+
+    def states() -> dict[str, str]:
+        return {one["name"]: one["state"] for one in live.alarms()}
+
+    listed = [replace(alarm(0), name="stale", state="unacknowledged")]
+    live.standing(listed)
+    live.only(listed)
+    assert set(states().values()) == {"unacknowledged"}, "it may have been raised after the list"
+    live.standing(listed)
+    live.only(listed)
+    assert states() == {
+        "dry_friction": "normal", "stale": "unacknowledged", STRUCTURE_DAMAGE: "unacknowledged",
+    }  # fmt: skip
+    live.take(replace(alarm(1), name="dry_friction", state="unacknowledged"), 0.0)
+    live.only(listed)
+    assert states()["dry_friction"] == "unacknowledged"
 
 
 def test_a_rig_without_promotions_has_an_empty_history(tmp_path: Path) -> None:
