@@ -208,6 +208,25 @@ def test_heavy_noise_on_every_signal_is_not_taken_for_a_trajectory_that_parts():
     np.testing.assert_allclose(found.iterations[-1][:2], [100.0, 1000.0], rtol=0.02)
 
 
+def test_a_method_says_no_more_than_it_has_checked(clean):
+    far = {"k4_46": 90.0, "k1_6": 1050.0, "k1_6_cubic": 130.0}
+    few = identify("gauss-newton", antenna(), clean, NAMES, far, iterations=2)
+    assert not few.converged
+    assert few.remarks == ("four digits are not stable after 2 iterations",)
+    apart = {"k1_6_cubic": -1e6}
+    gone = identify("gauss-newton", antenna(), clean, NAMES, apart)
+    assert gone.remarks == ("the model's trajectory diverged (NaN or infinite)",)
+    for method in ("direct", "kalman"):
+        few = identify(method, antenna(), clean, [*NAMES, "m6"], {"m6": 3.0}, iterations=1)
+        assert not few.converged
+        assert few.remarks[0] == "four digits are not stable after 1 iterations"
+    gaps = {name: column.copy() for name, column in clean.columns.items()}
+    gaps["x6"][100:140] = np.nan
+    told = "no signal without missing samples that shows x6.*; samples are missing of x6"
+    with pytest.raises(ModelError, match=told):
+        identify("direct", antenna(), Record(0.01, gaps))
+
+
 def test_windows_that_diverged_are_never_the_best() -> None:
     assert cheapest([float("nan"), 3.0, 1.0, float("inf")]) == 2
     assert cheapest([float("inf"), float("nan"), 3.0]) == 2

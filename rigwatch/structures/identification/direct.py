@@ -14,7 +14,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import make_interp_spline
 
 from rigwatch.physics.engine.equations import symbol
-from rigwatch.structures.identification.identify import Outcome, settled
+from rigwatch.structures.identification.identify import Outcome, settled, unsettled
 from rigwatch.structures.identification.least_squares import require_determined
 from rigwatch.structures.identification.least_squares import solve as least_squares
 from rigwatch.structures.identification.problem import Problem
@@ -54,7 +54,7 @@ def solve(problem: Problem, *, iterations: int = 25) -> Outcome:
         if settled(found[-2], found[-1]):
             require_determined(problem.names, step.blind, system.model.name)
             return Outcome(found[1:], covariance, True)
-    return Outcome(found[1:], covariance, False)
+    return Outcome(found[1:], covariance, False, (unsettled(iterations),))
 
 
 def motion(problem: Problem) -> tuple[FloatArray, FloatArray]:
@@ -76,8 +76,8 @@ def motion(problem: Problem) -> tuple[FloatArray, FloatArray]:
     for name in states:
         if symbol(name) not in signals:
             raise ModelError(
-                f"{system.model.name}: found no signal that shows {name}, which the direct approach"
-                " needs"
+                f"{system.model.name}: found no signal without missing samples that shows {name},"
+                f" which the direct approach needs{_with_gaps(problem)}"
             )
     columns = [signals[symbol(name)] for name in states]
     return (
@@ -96,6 +96,14 @@ def _measured(problem: Problem) -> dict[sympy.Expr, FloatArray]:
         for index, expression in enumerate(system.outputs.values())
         if expression in known and np.isfinite(problem.observed[:, index]).all()
     }
+
+
+def _with_gaps(problem: Problem) -> str:
+    """The signals that were left out since samples are missing, at the end of a sentence."""
+    there = np.isfinite(problem.observed)
+    some = there.any(axis=0) & ~there.all(axis=0)
+    found = [name for name, gaps in zip(problem.system.outputs, some, strict=True) if gaps]
+    return f"; samples are missing of {', '.join(found)}" if found else ""
 
 
 def _slope(signal: FloatArray, dt: float) -> FloatArray:

@@ -10,7 +10,7 @@ guess the trajectories diverge from the record and it fails.
 
 import numpy as np
 
-from rigwatch.structures.identification.identify import Outcome, settled
+from rigwatch.structures.identification.identify import Outcome, settled, unsettled
 from rigwatch.structures.identification.least_squares import require_determined
 from rigwatch.structures.identification.least_squares import solve as least_squares
 from rigwatch.structures.identification.problem import Problem
@@ -18,6 +18,7 @@ from rigwatch.wire.arrays import FloatArray
 
 SMALL = 0.02
 """Share of the signals below which errors count as model error."""
+PARTED = "the model's trajectory diverged (NaN or infinite)"
 LASTING = 0.4
 """Correlation of consecutive errors above which they are not noise."""
 
@@ -42,7 +43,7 @@ def solve(problem: Problem, *, iterations: int = 25, trust: float = 0.0) -> Outc
     for turn in range(iterations):
         outputs, slopes = problem.simulate(found[-1], problem.substeps)
         if not np.isfinite(slopes).all():
-            break
+            return Outcome(found[1:] or found, covariance, False, (PARTED,))
         errors, slopes, weight = _with_prior(
             problem, problem.observed - outputs, slopes, found[-1], trust, scale
         )
@@ -55,8 +56,7 @@ def solve(problem: Problem, *, iterations: int = 25, trust: float = 0.0) -> Outc
             require_determined(problem.names, step.blind, name)
             remarks = _doubts(problem.observed - outputs, scale)
             return Outcome(found[1:], covariance, not remarks, remarks)
-    remark = "the model's trajectory parted from the record"
-    return Outcome(found[1:] or found, covariance, False, (remark,))
+    return Outcome(found[1:] or found, covariance, False, (unsettled(iterations),))
 
 
 def _doubts(errors: FloatArray, scale: FloatArray) -> tuple[str, ...]:

@@ -145,6 +145,11 @@ def settled(before: FloatArray, after: FloatArray) -> bool:
     return bool(np.all(np.abs(after - before) < SETTLED * size))
 
 
+def unsettled(iterations: int) -> str:
+    """The remark of a method that has used up its iterations."""
+    return f"four digits are not stable after {iterations} iterations"
+
+
 def _named(method: str, problem: Problem, outcome: Outcome, seconds: float) -> Identification:
     names, last = problem.names, outcome.iterations[-1]
     if outcome.covariance is None:

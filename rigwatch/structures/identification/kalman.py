@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigwatch.structures.identification.identify import Outcome, settled
+from rigwatch.structures.identification.identify import Outcome, settled, unsettled
 from rigwatch.structures.identification.problem import Problem
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
@@ -62,7 +62,7 @@ def solve(
         if turn and settled(found[-2], found[-1]):
             return Outcome(found[1:], after, True, remarks)
         covariance = after * weight
-    return Outcome(found[1:], covariance / weight, False, remarks)
+    return Outcome(found[1:], covariance / weight, False, (unsettled(iterations), *remarks))
 
 
 @dataclass
