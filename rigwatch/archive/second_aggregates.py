@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.messages import EstimateBlock, blocks
+from rigwatch.wire.messages import EstimateBlock, Streams
 
 SECOND_NS = 1_000_000_000
 DAY_S = 86_400
@@ -48,17 +48,15 @@ class SecondAggregates:
 
     def __init__(self) -> None:
         self._series: dict[str, _Series] = {}
-        self._next: dict[tuple[str, int], int] = {}
+        self._streams = Streams()
         self._waiting: list[EstimateBlock] = []
         self._samples = 0
 
     def add(self, block: EstimateBlock) -> None:
         """Take the estimates of a block that are new."""
-        key = (block.device, block.boot)
-        fresh = blocks.unseen(block, self._next.get(key))
+        fresh = self._streams.fresh(block)
         if fresh is None or not len(fresh):
             return
-        self._next[key] = fresh.seq + len(fresh)
         self._waiting.append(fresh)
         self._samples += len(fresh)
         if self._samples >= _TOGETHER:

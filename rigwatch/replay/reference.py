@@ -15,7 +15,16 @@ from monitor.signals import Condition
 from rigwatch.replay.run import judge
 from rigwatch.replay.source import items
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.messages import Alarm, Column, EstimateBlock, Event, RunInfo, merged, pieces
+from rigwatch.wire.messages import (
+    Alarm,
+    Column,
+    EstimateBlock,
+    Event,
+    RunInfo,
+    is_of_structure,
+    merged,
+    pieces,
+)
 from rigwatch.wire.new_file import new_file
 from rigwatch.wire.session import LARGEST_BLOCK, Session, SessionWriter, open_session
 
@@ -116,4 +125,5 @@ def read_reference(path: Path) -> Output:
     session = open_session(path)
     said = [item.message for item in session.messages(["alarms", "events"])]
     announcements = tuple(item for item in said if isinstance(item, Alarm | Event))
-    return Output(tuple(session.estimates(size=_ENDLESS)), announcements)
+    found = (block for block in session.estimates(size=_ENDLESS) if not is_of_structure(block))
+    return Output(tuple(found), announcements)

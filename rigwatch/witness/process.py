@@ -30,6 +30,7 @@ from rigwatch.wire.messages import (
     MONITOR_STALE,
     Alarm,
     Health,
+    is_of_structure,
 )
 from rigwatch.wire.rig_config import RigConfig, SecuritySection, WitnessSection
 from rigwatch.witness.announcer import Announcer
@@ -103,7 +104,8 @@ class Witness:
 
     def turn(self, now: float, t_ns: int) -> None:
         """Check once; `now` is monotonic time [s], `t_ns` Unix time [ns]."""
-        if self._estimates.drain():
+        # Of a structure that is watched on the same rig they say nothing about the monitor.
+        if not all(map(is_of_structure, self._estimates.drain())):
             self._silence.end(now)
             self._unheard = False
             if not self._knows_standing and now - self._asked_at >= ASKED_AGAIN:

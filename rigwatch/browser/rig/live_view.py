@@ -16,6 +16,7 @@ from rigwatch.wire.messages import (
     Health,
     SampleBlock,
     columns_of,
+    is_of_structure,
     is_remembered,
     json_fields,
     remember,
@@ -101,14 +102,15 @@ class LiveView:
             self._health[message.source] = message, now
 
     def _keep(self, block: SampleBlock | EstimateBlock, now: float) -> None:
+        if isinstance(block, EstimateBlock) and is_of_structure(block):
+            return
         kind = "samples" if isinstance(block, SampleBlock) else "estimates"
         self._heard[kind] = now
         columns = columns_of(block)
         if kind == "estimates" and len(block):
             named = {column.name: column for column in columns}
             flags = [name for name in ("armed", "observable") if name in named]
-            if flags:  # else they are of a structure, not of the monitor
-                self._figures = {name: float(named[name].values[-1]) for name in flags}
+            self._figures = {name: float(named[name].values[-1]) for name in flags}
         shown = [c for c in columns if kind == "samples" or c.name in SHOWN_ESTIMATES]
         self._units |= {column.name: column.unit for column in shown}
         taken = slice(-block.seq % self._every, None, self._every)

@@ -8,7 +8,7 @@ import numpy as np
 from rigwatch.dashboard.board.alarm_book import LANES, AlarmBook
 from rigwatch.dashboard.board.palette import VERDICTS
 from rigwatch.wire.bus import ShelvedAlarm
-from rigwatch.wire.messages import EstimateBlock, Health, SampleBlock
+from rigwatch.wire.messages import EstimateBlock, Health, SampleBlock, is_of_structure
 
 SILENCE = 2.0
 """Time without samples, or of samples without estimates, after which the screen reports it [s]."""
@@ -91,7 +91,8 @@ class Facts:
 
     def see_estimates(self, block: EstimateBlock) -> None:
         """Record the last estimates."""
-        self._unjudged = self._unjudged_ns = 0
+        if not is_of_structure(block):
+            self._unjudged = self._unjudged_ns = 0
         for column in block.columns if len(block) else ():
             if np.isfinite(value := column.values[-1]):
                 self.figures[column.name] = float(value)

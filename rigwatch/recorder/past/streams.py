@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rigwatch.wire.messages import Block, Gap, Message, cut, unseen
+from rigwatch.wire.messages import Block, Gap, Message, Streams, cut, unseen
 from rigwatch.wire.session import Span, without
 
 
@@ -40,7 +40,7 @@ class BlockStream:
         self.hole: Hole | None = None
         self.filled = 0
         self.reached = 0
-        self._following: dict[int, int] = {}
+        self._following = Streams()
         self._last: Block | None = None
         self._held: list[Message] = []
         self._filled_spans: dict[int, list[Span]] = {}
@@ -112,6 +112,11 @@ class BlockStream:
         """The first block that waits."""
         return next((item for item in self._held if isinstance(item, Block)), None)
 
+    def _next_like(self, block: Block) -> Block | None:
+        """The first block that waits of the same stream."""
+        waiting = (item for item in self._held if isinstance(item, Block))
+        return next((one for one in waiting if self._following.are_one(one, block)), None)
+
     def _gaps(self) -> int:
         """Number of waiting messages before the first block."""
         behind = self._next()
@@ -119,15 +124,15 @@ class BlockStream:
 
     def _missing(self, block: Any) -> Any:
         """The part of a recorded block that is neither here already nor behind the hole."""
-        fresh, behind = unseen(block, self._following.get(block.boot)), self._next()
-        if fresh is None or behind is None or fresh.boot != behind.boot:
+        fresh, behind = unseen(block, self._following.next_seq(block)), self._next_like(block)
+        if fresh is None or behind is None:
             return fresh
         count = min(len(fresh), behind.seq - fresh.seq)
         return cut(fresh, 0, count) if count > 0 else None
 
     def _note(self, block: Block) -> None:
         self._last = block
-        self._following[block.boot] = block.seq + len(block)
+        self._following.note(block)
         self.reached = int(block.t_ns[-1])
 
     def _remaining(self, gap: Gap, answered: bool) -> list[Gap]:

@@ -34,6 +34,7 @@ from rigwatch.structures.report import too_little, verdict
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.messages import (
+    STATISTIC,
     STRUCTURE_DAMAGE,
     Alarm,
     Column,
@@ -214,7 +215,7 @@ class LiveDamage:
         names = [(f"residual_{n}", u) for n, u in zip(signals, self._beside.units, strict=True)]
         columns = tuple(
             Column(name, unit, table[:, k].copy())
-            for k, (name, unit) in enumerate([*names, ("statistic", "")])
+            for k, (name, unit) in enumerate([*names, (STATISTIC, "")])
         )
         t_ns = self._record.t_ns[begin : begin + len(rows)].copy()
         return EstimateBlock(self._device, self._boot or 0, self._first + begin, t_ns, columns)

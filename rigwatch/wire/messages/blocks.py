@@ -2,6 +2,9 @@
 
 A block holds consecutive samples `seq`, `seq + 1`, … of one boot of one device, whose times do not
 go back. Two blocks are joined only if the second continues the first and has the same columns.
+
+The estimates of two processes for the same samples, of a monitor and of a watched structure, have
+no column in common: they are two streams, each with numbers that go on (`Streams`).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -11,7 +14,13 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rigwatch.wire.messages.message_types import Column, ColumnTable, EstimateBlock, SampleBlock
+from rigwatch.wire.messages.message_types import (
+    STATISTIC,
+    Column,
+    ColumnTable,
+    EstimateBlock,
+    SampleBlock,
+)
 
 Block = SampleBlock | EstimateBlock
 B = TypeVar("B", SampleBlock, EstimateBlock)
@@ -169,6 +178,67 @@ def unseen(block: B, next_seq: int | None) -> B | None:
         return block
     known = next_seq - block.seq
     return cut(block, known, len(block)) if known < len(block) else None
+
+
+def is_of_structure(block: EstimateBlock) -> bool:
+    """Whether a block is about a structure that is watched, and not the monitor's."""
+    return any(column.name == STATISTIC for column in block.columns)
+
+
+class _Stream:
+    """A stream of blocks: the names of its columns so far, and the number that comes next."""
+
+    def __init__(self) -> None:
+        self.names: set[str] = set()
+        self.next_seq: int | None = None
+
+
+class Streams:
+    """How far each stream of blocks has come."""
+
+    def __init__(self) -> None:
+        self._of_boot: dict[tuple[str, int], list[_Stream]] = {}
+        self._known: dict[tuple[str, int, tuple[str, ...]], _Stream] = {}
+
+    def next_seq(self, block: Block) -> int | None:
+        """The number that comes next in the block's stream; None if it begins there."""
+        return self._stream(block).next_seq
+
+    def note(self, block: Block) -> None:
+        """Take it that the block is there."""
+        self._stream(block).next_seq = block.seq + len(block)
+
+    def fresh(self, block: B) -> B | None:
+        """What of a block is new, which is noted; None if it is all there already."""
+        part = unseen(block, self.next_seq(block))
+        if part is not None:
+            self.note(part)
+        return part
+
+    def are_one(self, first: Block, second: Block) -> bool:
+        """Whether two blocks are of one stream."""
+        return self._stream(first) is self._stream(second)
+
+    def _stream(self, block: Block) -> _Stream:
+        names = () if isinstance(block, SampleBlock) else _names(block)
+        key = (block.device, block.boot, names)
+        if (known := self._known.get(key)) is not None:
+            return known
+        beside = self._of_boot.setdefault(key[:2], [])
+        found = next((one for one in beside if not one.names.isdisjoint(names)), None)
+        if found is None:
+            found = _Stream()
+            beside.append(found)
+        found.names.update(names)
+        self._known[key] = found
+        return found
+
+
+def _names(block: EstimateBlock) -> tuple[str, ...]:
+    columns = block.columns
+    if isinstance(columns, ColumnTable):
+        return tuple([name for name, _ in columns.names])
+    return tuple([column.name for column in columns])
 
 
 def owned(block: B) -> B:

@@ -210,6 +210,8 @@ LONGEST_NAME, LONGEST_TEXT = 100, 500
 """Longest names and text of a command that are kept [characters]."""
 MONITOR_STALE = "monitor_stale"
 """The alarm that the witness raises."""
+STATISTIC = "statistic"
+"""The estimate that every watched structure has and no monitor."""
 STRUCTURE_DAMAGE = "structure_damage"
 """The alarm of a structure that is watched; it is in no list of standing alarms, all others are the
 monitor's."""

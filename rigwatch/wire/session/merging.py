@@ -8,10 +8,12 @@ from rigwatch.wire.messages import (
     Message,
     SampleBlock,
     blocks,
+    is_of_structure,
 )
 
 LARGEST_BLOCK = 4096
 """Most samples per message, which bounds a reader's memory."""
+_Runs = dict[tuple[type[Message], str, bool], tuple[list[Message], int]]
 
 
 def merge_pending(messages: Iterable[Message], largest: int = LARGEST_BLOCK) -> list[Message]:
@@ -21,7 +23,7 @@ def merge_pending(messages: Iterable[Message], largest: int = LARGEST_BLOCK) -> 
     command, so that the command keeps its position between the samples.
     """
     slots: list[list[Message]] = []
-    runs: dict[tuple[type[Message], str], tuple[list[Message], int]] = {}
+    runs: _Runs = {}
     for message in messages:
         if isinstance(message, SampleBlock | EstimateBlock):
             if len(message):
@@ -50,11 +52,13 @@ def by_chunk(messages: list[Message]) -> list[list[Message]]:
 
 def _append_block(
     slots: list[list[Message]],
-    runs: dict[tuple[type[Message], str], tuple[list[Message], int]],
+    runs: _Runs,
     block: SampleBlock | EstimateBlock,
     largest: int,
 ) -> None:
-    key = (type(block), block.device)
+    # The estimates of a monitor and of a structure stand one after the other, not in turns.
+    beside = isinstance(block, EstimateBlock) and is_of_structure(block)
+    key = (type(block), block.device, beside)
     slot, length = runs.get(key, ([], 0))
     tail = slot[-1] if slot else None
     fits = length + len(block) <= largest

@@ -24,6 +24,7 @@ from rigwatch.wire.messages import (
     Message,
     RunInfo,
     SampleBlock,
+    Streams,
     Topic,
     blocks,
     decode,
@@ -213,7 +214,7 @@ class Session:
         end: int | None = None,
         size: int = MERGED_SAMPLES,
     ) -> Iterator[EstimateBlock]:
-        """The recorded estimates, merged as in `samples`."""
+        """The recorded estimates, merged as in `samples`, of all processes that made some."""
         return self._merged(ESTIMATES, device, start, end, size)
 
     def _merged(
@@ -225,17 +226,15 @@ class Session:
         self, line: Topic, device: str | None, start: int | None, end: int | None, size: int
     ) -> Iterator[Any]:
         """Blocks of one topic, each sample once."""
-        following: dict[tuple[str, int], int] = {}
+        streams = Streams()
         # A clock may step between two blocks, so a span is taken out of each of them.
         spanned = start is not None or end is not None
         for whole in self._decoded(line, 1 if spanned else size):
             if device is not None and whole.device != device:
                 continue
-            key = (whole.device, whole.boot)
-            block = blocks.unseen(whole, following.get(key))
+            block = streams.fresh(whole)
             if block is None:
                 continue
-            following[key] = block.seq + len(block)
             part = blocks.between(block, start, end) if spanned else block
             if part is not None:
                 yield part
