@@ -101,7 +101,7 @@ def _measured(problem: Problem) -> dict[sympy.Expr, FloatArray]:
 def _with_gaps(problem: Problem) -> str:
     """The signals that were left out since samples are missing, at the end of a sentence."""
     there = np.isfinite(problem.observed)
-    some = there.any(axis=0) & ~there.all(axis=0)
+    some = np.asarray(there.any(axis=0) & ~there.all(axis=0))
     found = [name for name, gaps in zip(problem.system.outputs, some, strict=True) if gaps]
     return f"; samples are missing of {', '.join(found)}" if found else ""
 

@@ -86,7 +86,7 @@ class _Filter:
     def remarks(self) -> tuple[str, ...]:
         """The outputs that are left out, if there are any."""
         outputs, observed = self.problem.system.model.outputs, self.problem.observed
-        seen = np.isfinite(observed).any(axis=0)
+        seen = np.asarray(np.isfinite(observed).any(axis=0))
         silent = [
             n for n, there, v in zip(outputs, seen, self.variance, strict=True) if there and not v
         ]
