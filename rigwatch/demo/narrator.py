@@ -22,8 +22,8 @@ ACTS = {
     ),
 }
 WHERE_TO_LOOK = (
-    "on the dashboard, watch the verdict and the residual: measured minus modelled acceleration,",
-    "which stays within its limits while the rig is healthy",
+    "on the dashboard, watch the verdict and the residual: measured minus modelled acceleration;",
+    "its change, drawn in the same plot, stays between the red limits while the rig is healthy",
 )
 NEUTRAL = {"coulomb": 0.0, "actuator_gain": 1.0}
 CAUSE_FOLLOWS = (
@@ -228,7 +228,9 @@ class Narrator:
         self._told.add(alarm.name)
 
     def _tell_whose_name(self, alarm: Alarm) -> None:
-        """Say that an alarm names the fault of an earlier one."""
+        """Say that an alarm names the fault of an earlier one, or that its name may follow."""
+        if alarm.name == NAMELESS and NAMELESS not in self._told:
+            self._say("            (something has changed; what it is follows as a second alarm)")
         if alarm.name != NAMELESS and self._unnamed is not None:
             self._say(f"            (this names the fault behind {self._called(self._unnamed)})")
         self._unnamed = alarm if alarm.name == NAMELESS else None

@@ -252,6 +252,7 @@ def test_an_alarm_that_names_the_fault_of_an_earlier_one_says_so() -> None:
     narrator.alarm(alarm("dry_friction", 21 * RATE))
     named = [line.strip() for line in said if "this names" in line]
     assert named == ["(this names the fault behind the alarm of 20.00 s)"]
+    assert sum("follows as a second alarm" in line for line in said) == 1
     said.clear()
     narrator.alarm(alarm("dry_friction", 30 * RATE, "normal"))
     narrator.alarm(alarm("other_fault", 40 * RATE))
