@@ -226,6 +226,7 @@ settle_memory()
 before = library.mallinfo2().used
 for length in range(1, 128):
     needed = [np.ones(length) for _ in range(7)]
+for length in range(1, 1024):
     needed = [np.ones(length, np.uint8) for _ in range(7)]
 print((library.mallinfo2().used - before) // 1000)
 """

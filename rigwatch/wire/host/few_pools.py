@@ -13,9 +13,8 @@ gathers over months: half a megabyte to one. Only a collection of the old object
 Python's own arenas, a megabyte each, are full after start-up: a passing need of some kilobytes
 takes another one, which fills over weeks and stays. Its room is taken at the start instead.
 
-Numpy keeps up to seven freed arrays of each size below a kilobyte, 3 MB in all. Blocks of ever new
-lengths come for months, and each leaves some: short ones, and those of numbers, are made at the
-start.
+Numpy keeps up to seven freed arrays of each size below a kilobyte, 4 MB in all. Blocks of ever new
+lengths come for months, and the flags of each leave one: all are made at the start.
 
 Pieces that are freed between others stay with the process as well: the library gives back only what
 is free at the end of a pool, unless it is asked for all pages that hold nothing.
@@ -35,8 +34,8 @@ ROOM, SMALL = 1 << 20, 460
 """Room in Python's arenas beyond what start-up needs, and the objects that take it for a moment, of
 the largest kind that arenas hold [bytes].
 """
-ARRAYS, OF_EACH = (*range(1, 512), *range(512, 1024, 8)), 7
-"""Sizes of arrays that numpy keeps, of flags or numbers of eight bytes [bytes]; number of each."""
+ARRAYS, OF_EACH = range(1, 1024), 7
+"""Sizes of arrays that numpy keeps [bytes]; number of each."""
 _kept: list[bytes] = []
 """One of them: an arena without any would be given back."""
 TIDY_EVERY = 60.0
