@@ -1,7 +1,8 @@
-"""Room for pieces of bytes that come and go in one order, taken once and used again.
+"""Room for pieces of bytes that come and go in one order, in slabs that are used again.
 
 Pieces of ever new lengths that live for minutes leave holes in a process's memory, which grow over
 months. In slabs of one size they leave none: a slab whose pieces are all gone takes the next ones.
+One such slab waits; others are given back, or a process would keep the most that it ever needed.
 """
 
 from collections import deque
@@ -17,7 +18,7 @@ class Slabs:
     def __init__(self) -> None:
         self._filled: deque[bytearray] = deque()
         self._pieces: deque[int] = deque()  # in each of them
-        self._free: list[bytearray] = []
+        self._free: bytearray | None = None
         self._used = 0  # of the newest [bytes]
 
     def put(self, piece: Sequence[int] | bytes) -> memoryview:
@@ -36,7 +37,8 @@ class Slabs:
     def _slab(self, size: int) -> bytearray:
         if size > SLAB:
             return bytearray(size)
-        return self._free.pop() if self._free else bytearray(SLAB)
+        free, self._free = self._free, None
+        return bytearray(SLAB) if free is None else free
 
     def drop_oldest(self) -> None:
         """Drop the oldest piece: what showed it must no longer be used."""
@@ -44,5 +46,5 @@ class Slabs:
         if not self._pieces[0]:
             self._pieces.popleft()
             slab = self._filled.popleft()
-            if len(slab) == SLAB:
-                self._free.append(slab)
+            if len(slab) == SLAB and self._free is None:
+                self._free = slab

@@ -1,4 +1,4 @@
-"""Pieces in slabs: each stays as it is until it is dropped, in memory that is taken once."""
+"""Pieces in slabs: each stays as it is until it is dropped, in memory that stays what it is."""
 
 import random
 import tracemalloc
@@ -42,5 +42,21 @@ def test_memory_is_flat_once_all_room_is_taken() -> None:
     try:
         assert 20 * SLAB < run(2000) < most
         assert run(20_000) < most
+    finally:
+        tracemalloc.stop()
+
+
+def test_room_that_was_needed_once_is_given_back() -> None:
+    slabs = Slabs()
+    tracemalloc.start()
+    try:
+        slabs.put(b"one")
+        before = tracemalloc.get_traced_memory()[0]
+        for _ in range(40):
+            slabs.put(bytes(SLAB // 2))
+        assert tracemalloc.get_traced_memory()[0] - before > 19 * SLAB
+        for _ in range(40):
+            slabs.drop_oldest()
+        assert tracemalloc.get_traced_memory()[0] - before < 3 * SLAB
     finally:
         tracemalloc.stop()
