@@ -6,9 +6,10 @@ commands ─▶ alarms ─┘          link, silence, losses ─▶ alarms
 
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import NamedTuple
 
 from monitor.alarms import AlarmJournal, Announcement, just_returned, read_end, unsaid
 from monitor.detectors import FRICTION, detectors_of
@@ -64,6 +65,7 @@ from rigwatch.wire.host import (
     tidy_memory,
     unless_ended,
 )
+from rigwatch.wire.kept_state import KeptState
 from rigwatch.wire.messages import (
     ALARMS,
     ALIVE_KEY,
@@ -72,7 +74,9 @@ from rigwatch.wire.messages import (
     HEALTH,
     MODELS,
     Alarm,
+    EstimateBlock,
     Event,
+    Form,
     Gap,
     Health,
     SampleBlock,
@@ -86,6 +90,43 @@ TURN = 0.02
 """Longest wait for samples before commands and silence are checked [s]."""
 LONGEST_BLOCK = 512
 """Number of samples processed and published per step while the monitor catches up."""
+
+
+class Rested(NamedTuple):
+    """From where a rig's samples can be judged in a row of a table.
+
+    Attributes:
+        device, boot, following: the next sample.
+        state: of the stages.
+        offset_ns: the monitor's time less monotonic time [ns].
+    """
+
+    device: str
+    boot: int
+    following: int
+    state: KeptState
+    offset_ns: int
+
+
+class Passed(NamedTuple):
+    """What a row of a table has done.
+
+    Attributes:
+        samples: that were judged.
+        boot, following: the sample after them.
+        t_ns: time of the last one [ns].
+        offset_ns: as in `Rested`.
+        latencies_ms: time from each block to its estimates [ms].
+        kept: the newest of them, for a ranking.
+    """
+
+    samples: int
+    boot: int
+    following: int
+    t_ns: int
+    offset_ns: int
+    latencies_ms: list[float]
+    kept: tuple[EstimateBlock, SampleBlock] | None
 
 
 class MonitorProcess:
@@ -132,7 +173,7 @@ class MonitorProcess:
         self._delivered_s = self._estimated_s = 0.0
         self._router_lost_at: float | None = None
         self._recorder: Health | None = None
-        self._unsuitable = ""
+        self._unsuitable, self._is_calm = "", False
         self._standing = self.rig.alarms.standing()
         check = CommandCheck(bus, config.bus.security)
         self._operators = OperatorDesk(bus, check)
@@ -194,8 +235,72 @@ class MonitorProcess:
         again = position and done and position[0] == done[0] and position < done
         return done if again else position
 
+    def open_row(self, suits: Callable[[Form], bool]) -> Rested | None:
+        """Leave samples to a row of a table, if they simply follow and nothing else happens.
+
+        All that was read has been judged. What the row does is told by `went_on` before anything
+        else is done here.
+
+        Args:
+            suits: whether blocks of a form can be judged there.
+        """
+        place = self._last_judged()
+        if not self._is_calm or place is None or self._explainer.waits_for_samples:
+            return None
+        boot, following = place[0], place[1] + 1
+        state = self.rig.at_rest(boot, following)
+        if state is None or self.reader.open_row(suits) != place:
+            self.reader.close_row()
+            return None
+        return Rested(self.reader.device, boot, following, state, self._time.offset_ns)
+
+    def went_on(self, passed: Passed) -> None:
+        """A row has judged samples since `open_row`, and published their estimates."""
+        self.rig.went_on(passed.samples, passed.boot, passed.following, passed.t_ns)
+        self._judged_ns = passed.t_ns
+        self._time.follow(passed.offset_ns)
+        self._delivered_s += passed.samples / self.rig.model.sample_rate
+        self._estimated_s = self._delivered_s
+        self._health.judged_after(passed.latencies_ms)
+        if passed.kept is not None:
+            self.keep_for_ranking(*passed.kept)
+
+    def keep_for_ranking(self, estimates: EstimateBlock, samples: SampleBlock) -> None:
+        """Keep what a row has judged."""
+        self._explainer.take(estimates, samples)
+
+    @property
+    def loose_samples(self) -> int:
+        """Samples that are kept for a ranking in blocks as they came."""
+        return self._explainer.loose
+
+    @property
+    def cursor(self) -> Cursor | None:
+        """Where the position is kept."""
+        return self._cursor
+
+    def is_calm(self, silent_s: float) -> bool:
+        """Whether a look around would find what the last one found: nothing that holds.
+
+        Args:
+            silent_s: time since the last sample [s].
+        """
+        return (
+            self._is_calm
+            and silent_s <= self._stale_after
+            and not self._health.will_be_due(time.monotonic_ns())
+            and not len(self._of_daq)
+            and not len(self._of_recorder)
+            and not self._operators.has_some
+            and not self._models.has_some
+            and not self._explainer.has_results
+            and (self._recorder is None or self._recorder_presence.has_token)
+            and not self.reader.has_some_alone
+        )
+
     def look_around(self) -> None:
         """Execute commands, check the link, publish the health."""
+        self._is_calm = False
         now_ns = self._now_ns()
         for announced in self._operators.execute(self.rig.alarms, now_ns, self._last_judged()):
             self.say(announced)
@@ -204,10 +309,12 @@ class MonitorProcess:
             self.bus.publish(EVENTS, event)
         seen = self._seen()
         self.say(self.rig.alarms.pass_to(now_ns))
+        calm = True
         for name, cause, holds in self._reports(seen):
             if self.rig.alarms.holds(name) != holds:
                 at = occasion(seen, cause, now_ns)
                 self.say(self.rig.alarms.report(name, at, active=holds))
+            calm = calm and not holds
         if reason := self._links.lasting_reason(seen):
             self.say(self.rig.alarms.reword("link", reason, now_ns))
         self._shelf = shelf_of(self.rig.alarms)
@@ -215,6 +322,7 @@ class MonitorProcess:
         self._announce_clock_step(seen)
         if self._health.is_due(seen.monotonic_ns):
             self._tell_health(seen)
+        self._is_calm = calm and self._router_lost_at is None
 
     def _now_ns(self, sample_ns: int | None = None) -> int:
         """The time by which alarms count [ns]; `sample_ns` is that of a sample that has come."""
