@@ -114,7 +114,7 @@ class RigMonitor:
         )
 
     def at_rest(self, boot: int, seq: int) -> KeptState | None:
-        """The state with which samples from this one on can be judged elsewhere, in a row; else None.
+        """The state with which samples from this one on are judged in a row; None for none.
 
         As long as no condition holds at any of them, `went_on` tells all that they change here.
         """

@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
-from typing import NamedTuple
 
 from monitor.alarms import AlarmJournal, Announcement, just_returned, read_end, unsaid
 from monitor.detectors import FRICTION, detectors_of
@@ -25,6 +24,7 @@ from monitor.pipeline import (
     ready_of,
 )
 from monitor.process.cursor import Cursor
+from monitor.process.handover import Passed, Rested
 from monitor.process.health import HealthBook
 from monitor.process.key_watch import KeyWatch
 from monitor.process.link_watch import (
@@ -65,7 +65,6 @@ from rigwatch.wire.host import (
     tidy_memory,
     unless_ended,
 )
-from rigwatch.wire.kept_state import KeptState
 from rigwatch.wire.messages import (
     ALARMS,
     ALIVE_KEY,
@@ -90,43 +89,6 @@ TURN = 0.02
 """Longest wait for samples before commands and silence are checked [s]."""
 LONGEST_BLOCK = 512
 """Number of samples processed and published per step while the monitor catches up."""
-
-
-class Rested(NamedTuple):
-    """From where a rig's samples can be judged in a row of a table.
-
-    Attributes:
-        device, boot, following: the next sample.
-        state: of the stages.
-        offset_ns: the monitor's time less monotonic time [ns].
-    """
-
-    device: str
-    boot: int
-    following: int
-    state: KeptState
-    offset_ns: int
-
-
-class Passed(NamedTuple):
-    """What a row of a table has done.
-
-    Attributes:
-        samples: that were judged.
-        boot, following: the sample after them.
-        t_ns: time of the last one [ns].
-        offset_ns: as in `Rested`.
-        latencies_ms: time from each block to its estimates [ms].
-        kept: the newest of them, for a ranking.
-    """
-
-    samples: int
-    boot: int
-    following: int
-    t_ns: int
-    offset_ns: int
-    latencies_ms: list[float]
-    kept: tuple[EstimateBlock, SampleBlock] | None
 
 
 class MonitorProcess:
@@ -289,14 +251,22 @@ class MonitorProcess:
             self._is_calm
             and silent_s <= self._stale_after
             and not self._health.will_be_due(time.monotonic_ns())
-            and not len(self._of_daq)
-            and not len(self._of_recorder)
+            and self._hears_nothing_new()
             and not self._operators.has_some
             and not self._models.has_some
             and not self._explainer.has_results
             and (self._recorder is None or self._recorder_presence.has_token)
             and not self.reader.has_some_alone
         )
+
+    def _hears_nothing_new(self) -> bool:
+        """Whether daq and recorder say nothing, or nothing that has to be told."""
+        if not len(self._of_daq) and not len(self._of_recorder):
+            return True
+        self._hear_of_others()
+        if self._daq_trouble or self._two_devices:
+            return False
+        return not any(holds for *_, holds in self._reports_of_others())
 
     def look_around(self) -> None:
         """Execute commands, check the link, publish the health."""
@@ -334,13 +304,17 @@ class MonitorProcess:
     def _reports(self, seen: Seen) -> Iterator[Report]:
         """The alarms that no sample raises."""
         yield from self._links.reports(seen)
+        yield from self._reports_of_others()
+        yield from self._keys.reports(seen)
+
+    def _reports_of_others(self) -> Iterator[Report]:
+        """Those of what daq and recorder have said last, and of the journal."""
         unjudged = self._delivered_s - self._estimated_s
         yield from device_reports(self._daq, unjudged, self._unsuitable)
         failure = self._journal.failure if self._journal else ""
         there = self._recorder_presence.holds(time.monotonic())
         absence = "" if there else self._absence("recorder")
         yield from disk_reports(self._recorder, absence, failure)
-        yield from self._keys.reports(seen)
 
     def _announce_router(self, seen: Seen) -> None:
         """Report to subscribers that the router was unavailable."""
@@ -471,6 +445,11 @@ class MonitorProcess:
             self._recorder = None if health.state == "stopped" else health
             self._recorder_presence.heard(time.monotonic())
 
+    @property
+    def _two_devices(self) -> bool:
+        """Whether daq says that two devices speak."""
+        return self._daq is not None and self._daq.state == "two devices"
+
     def _seen(self) -> Seen:
         self._hear_of_others()
         daq_there = self._daq_there()
@@ -485,7 +464,7 @@ class MonitorProcess:
             silent,
             self._daq_trouble if daq_there else self._absence("daq"),
             self.reader.heard,
-            self.reader.contested or (self._daq is not None and self._daq.state == "two devices"),
+            self.reader.contested or self._two_devices,
             self._device,
             self.reader.position or (0, -1),
         )

@@ -352,6 +352,7 @@ def take_turns(
     heartbeat: Heartbeat,
     together: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
     collect: Callable[[], None] = _nothing,
+    *,
     tables: Tables | None = None,
 ) -> None:
     """The loop over all rigs until `stop` is set.
@@ -392,7 +393,7 @@ def run_several(paths: list[Path]) -> int:
     seats = [Seat(path, _log.warning, partial(connect, links=links)) for path in paths]
     heartbeat.ready()
     tables = Tables(len(seats))
-    take_turns(seats, stop, heartbeat, links.together, links.collect, tables)
+    take_turns(seats, stop, heartbeat, links.together, links.collect, tables=tables)
     heartbeat.stopping()
     for seat in seats:
         seat.close()

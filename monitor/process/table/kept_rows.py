@@ -28,13 +28,13 @@ class _Kept(NamedTuple):
     """Samples of each row: numbers of them, times, values and change.
 
     Attributes:
-        count: of the samples that are kept, shape (rows,).
+        number: of the samples that are kept, shape (rows,).
         limit: from how many on they are given to the rig, shape (rows,).
         times: of device and host, shape (rows, 2, ROOM).
         values: of the channels, and last the change, shape (rows, channels + 1, ROOM).
     """
 
-    count: IntArray
+    number: IntArray
     limit: IntArray
     times: IntArray
     values: FloatArray
@@ -58,7 +58,7 @@ class KeptRows:
 
     def enter(self, row: int, columns: int, loose: int) -> None:
         """Keep a row's samples of so many channels; its rig has kept `loose` ones itself."""
-        self._columns[row], self._kept.count[row] = columns, 0
+        self._columns[row], self._kept.number[row] = columns, 0
         self._kept.limit[row] = max(1, JOINED - loose)
 
     def keep(
@@ -86,10 +86,10 @@ class KeptRows:
             source: device, boot, and the number of the sample after the last one.
             names: of the channels.
         """
-        n, c = int(self._kept.count[row]), len(names)
+        n, c = int(self._kept.number[row]), len(names)
         if not n:
             return None
-        self._kept.count[row], self._kept.limit[row] = 0, JOINED
+        self._kept.number[row], self._kept.limit[row] = 0, JOINED
         device, boot, end = source
         device_us, t_ns = self._kept.times[row, :, :n].copy()
         values = self._kept.values[row, : c + 1, :n].copy()
@@ -120,12 +120,12 @@ def _keep(  # noqa: PLR0917
         if not wanted[k]:
             continue
         row, n, begin = blocks.rows[k], blocks.samples[k], blocks.at[k]
-        at, change = kept.count[row], OUTPUT_ROWS * begin + CHANGE_ROW * n
+        at, change = kept.number[row], OUTPUT_ROWS * begin + CHANGE_ROW * n
         for i in range(n):
             kept.times[row, 0, at + i] = blocks.device_us[begin + i]
             kept.times[row, 1, at + i] = t_ns[begin + i]
             for c in range(channels[row]):
                 kept.values[row, c, at + i] = blocks.values[blocks.values_at[k] + c * n + i]
             kept.values[row, channels[row], at + i] = columns[change + i]
-        kept.count[row] = at + n
+        kept.number[row] = at + n
         full[k] = at + n >= kept.limit[row]

@@ -16,7 +16,8 @@ from monitor.pipeline import (
     places_of,
 )
 from monitor.process.cursor import Cursor
-from monitor.process.loop import MonitorProcess, Passed
+from monitor.process.handover import Passed
+from monitor.process.loop import MonitorProcess
 from monitor.process.rig_time import APART_NS
 from monitor.process.table.kept_rows import KeptRows
 from rigwatch.wire.arrays import BoolArray
@@ -325,7 +326,8 @@ class Table:
         found: list[int] = np.flatnonzero(self._there & ~self._reading.state.open).tolist()
         due = np.flatnonzero(self._there & self._reading.state.open & (self._look_at <= now))
         if due.size:
-            self._look_at[due] = now + look_every
+            # All in the same turns: what a look needs is then at hand.
+            self._look_at[due] = look_every * (now // look_every + 1)
             connected = self._is_connected(now)
             silent = (now - self._heard_at[due]).tolist()
             for number, silent_s in zip(due.tolist(), silent, strict=True):

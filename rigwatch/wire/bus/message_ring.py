@@ -84,6 +84,8 @@ class MessageRing:
 
     def __init__(self, run: int, capacity: int = RING_BYTES) -> None:
         self._run, self._capacity = run, capacity
+        # Rings of one process that pack at one moment would delay each other's messages.
+        self._most_kept = 2 * PACKED - run % PACKED
         self._packs: deque[Pack] = deque()
         self._room = Slabs()
         self._kept: deque[bytes] = deque()  # the newest, up to the number before `_next`
@@ -107,7 +109,7 @@ class MessageRing:
             self._next += 1
             self._kept.append(payload)
             self._bytes += len(payload)
-            if len(self._kept) >= 2 * PACKED:
+            if len(self._kept) >= self._most_kept:
                 first = self._first_kept
                 older = [self._kept.popleft() for _ in range(PACKED)]
                 self._packs.append(Pack.of(first, older, self._room))

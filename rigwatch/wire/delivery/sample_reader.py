@@ -184,7 +184,7 @@ class SampleReader:
         is told by `went_on`, before anything is read here again.
 
         Args:
-            suits: whether blocks of a form are those that are expected; device and boot are checked.
+            suits: whether blocks of a form can be taken there; their device and boot are checked.
 
         Returns:
             (boot, seq) of the last sample that was read; None if the row remains closed.

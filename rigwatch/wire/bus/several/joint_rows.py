@@ -7,6 +7,9 @@ A row is open while nothing of its rig waits elsewhere, so nothing is overtaken.
 rig's reader, which has read all that has come, and closed by whatever does not simply follow.
 """
 
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -182,8 +185,9 @@ class JointRows:
         whole = bool(taken.all())
         if whole or taken.any():
             parts = parts if whole else np.ascontiguousarray(parts[:, taken])
-            device_us, t_ns = out[1][:, : parts[1].sum()]
-            self._batches.append(Batch(*parts, device_us, t_ns, out[2], data))
+            rows, samples, *places = parts
+            device_us, t_ns = out[1][:, : samples.sum()]
+            self._batches.append(Batch(rows, samples, *places, device_us, t_ns, out[2], data))
         return [] if whole else _left(data, ~taken)
 
     def _learn(self, row: int, payload: bytes) -> None:
@@ -222,9 +226,9 @@ def _enter_ids(state: RowState) -> None:
 
 @part()
 def _hash(raw: ByteArray, at: int, size: int) -> int:
-    found = np.int64(5381)
+    found = 5381
     for k in range(size):
-        found = (found * np.int64(33) + np.int64(raw[at + k])) & np.int64(0xFFFFFFFF)
+        found = (found * 33 + int(raw[at + k])) & 0xFFFFFFFF
     return found
 
 
@@ -246,7 +250,7 @@ def _row_of(state: RowState, raw: ByteArray, at: int, size: int) -> int:
 
 @part()
 def _short(raw: ByteArray, at: int) -> int:
-    return np.int64(raw[at]) | np.int64(raw[at + 1]) << np.int64(8)
+    return int(raw[at]) | int(raw[at + 1]) << 8
 
 
 @kernel()
@@ -269,24 +273,11 @@ def _read(  # noqa: PLR0917
         if this is no joined message.
     """
     count = parts.shape[1]
-    body = _HEAD + _LENGTHS * count
-    if body > raw.size:
+    if not _is_whole(raw, count):
         return -1
-    at, samples, numbers = body, 0, 0
+    at, samples, numbers = _HEAD + _LENGTHS * count, 0, 0
     for p in range(count):
-        lengths = _HEAD + _LENGTHS * p
-        rig, mark = _short(raw, lengths), _short(raw, lengths + 2)
-        size = _short(raw, lengths + 4) | _short(raw, lengths + 6) << 16
-        at += rig + mark + size
-        if at > raw.size:
-            return -1
-    if at != raw.size:
-        return -1
-    at = body
-    for p in range(count):
-        lengths = _HEAD + _LENGTHS * p
-        rig, mark = _short(raw, lengths), _short(raw, lengths + 2)
-        size = _short(raw, lengths + 4) | _short(raw, lengths + 6) << 16
+        rig, mark, size = _lengths(raw, p)
         start, at = at, at + rig + mark + size
         if p >= begin:
             row = _row_of(state, raw, start, rig)
@@ -321,6 +312,26 @@ def _read(  # noqa: PLR0917
             samples += parts[1, p]
             numbers += parts[1, p] * _columns_of(state, parts[0, p], size)
     return count
+
+
+@part()
+def _is_whole(raw: ByteArray, count: int) -> bool:
+    """Whether these are the bytes of so many messages that were joined."""
+    at = _HEAD + _LENGTHS * count
+    if at > raw.size:
+        return False
+    for p in range(count):
+        rig, mark, size = _lengths(raw, p)
+        at += rig + mark + size
+    return at == raw.size
+
+
+@part()
+def _lengths(raw: ByteArray, p: int) -> tuple[int, int, int]:
+    """Those of a part's rig, mark and payload."""
+    at = _HEAD + _LENGTHS * p
+    size = _short(raw, at + 4) | _short(raw, at + 6) << 16
+    return _short(raw, at), _short(raw, at + 2), size
 
 
 @part()

@@ -3,6 +3,9 @@
 The bytes are those of `join`, of blocks as `encode` writes them with their marks.
 """
 
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
+
 from itertools import pairwise
 from typing import NamedTuple
 

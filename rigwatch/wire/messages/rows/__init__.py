@@ -1,6 +1,6 @@
 """Blocks of many rigs read from and written to bytes by compiled loops, a rig in each row.
 
-    bytes of a block ─▶ Form: which bytes are the same in each block of a boot ─▶ read_block ─▶ numbers
+    bytes of a block ─▶ Form: the bytes that blocks of a boot share ─▶ read_block ─▶ numbers
     numbers ─▶ write_block, with the heads that `EstimateHeads` keeps ─▶ bytes of a block
 
 A form and heads are made by the one encoding there is (`packed`, `packed_encoding`), so the bytes

@@ -4,6 +4,9 @@ The other bytes of blocks of one boot and length are the same: one comparison co
 boot, names, lengths, and that no reading is flagged.
 """
 
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
+
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -157,9 +160,9 @@ def _number(raw: ByteArray, at: int, end: int) -> int:
     """The zigzag varint that fills these bytes, 0 for none; -1 if it does not, or is negative."""
     if end - at > _LONGEST_NUMBER:
         return -1
-    value = np.int64(0)
+    value = 0
     for k in range(end - at):
         if (raw[at + k] >= 128) != (k < end - at - 1):
             return -1
-        value |= np.int64(raw[at + k] & 127) << np.int64(7 * k)
+        value |= int(raw[at + k] & 127) << 7 * k
     return value >> 1 if value & 1 == 0 else -1

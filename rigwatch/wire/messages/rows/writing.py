@@ -1,5 +1,8 @@
 """Writes blocks of estimates whose columns are the rows of one array, as `encode` does."""
 
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
+
 from typing import NamedTuple
 
 import numpy as np
