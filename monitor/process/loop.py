@@ -207,7 +207,8 @@ class MonitorProcess:
             suits: whether blocks of a form can be judged there.
         """
         place = self._last_judged()
-        if not self._is_calm or place is None or self._explainer.waits_for_samples:
+        waits = self._unsuitable or self._explainer.waits_for_samples
+        if not self._is_calm or place is None or waits:
             return None
         boot, following = place[0], place[1] + 1
         state = self.rig.at_rest(boot, following)

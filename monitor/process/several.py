@@ -158,7 +158,7 @@ class Seat:
         try:
             return process.reader.may_hold()
         except Exception as error:  # as in `_alone`
-            self._fail(error)
+            self.fail(error)
             return False
 
     def read(self) -> None:
@@ -177,7 +177,7 @@ class Seat:
         try:
             work(process)
         except Exception as error:  # whatever is wrong with one rig, the others are watched
-            self._fail(error)
+            self.fail(error)
 
     def _read(self, process: MonitorProcess) -> None:
         if not self._due:
@@ -245,7 +245,8 @@ class Seat:
             self._again_at = float("inf")
             self._connect()
 
-    def _fail(self, error: Exception) -> None:
+    def fail(self, error: Exception) -> None:
+        """End this run of the rig; it starts anew after a pause."""
         self._before = self.delivered
         self.close()
         self._wait(error)
@@ -260,7 +261,7 @@ class Seat:
         process, self._process = self._process, None
         table, self._table = self._table, None
         if table is not None:
-            table.close(self._number)
+            self._before += table.close(self._number)
         self._due.clear()
         if process is None:
             return
@@ -333,6 +334,8 @@ def _judge_rows(seats: Sequence[Seat], tables: Tables) -> set[int]:
             seats[number].leave_table()
         for one in left:
             seats[one.number].see_to(one)
+        for number, error in table.failures():
+            seats[number].fail(error)
         gone |= alone
     return gone
 

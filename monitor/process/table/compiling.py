@@ -32,7 +32,7 @@ def compile_table(model: RigModel) -> None:
     reading, steady = JointRows(1), SteadyRows(1, MOST_ROW_COLUMNS)
     estimates = EstimateRows(1, PUBLISHED_NAMES, MOST_ROW_SAMPLES)
     reading.name(0, _RIG)
-    reading.open(_RIG, Source(_RIG, lambda _: True), n)
+    reading.open(_RIG, Source(_RIG, _RIG, _BOOT, lambda _: True), n)
     reading.take(join([(_RIG, b"", encode(_block(model, n)))]), _RIG)
     (batch,) = reading.taken()
     steady.enter(0, state, [*range(len(model.channels))], len(model.channels))

@@ -44,7 +44,7 @@ from rigwatch.wire.messages import (
 
 CONNECTED_FOR = 0.05
 """Time for which a router that was there is not asked for again [s]."""
-LATENCIES = 64
+LATENCIES = 256
 """Blocks of a row whose latencies are kept: more than come from one health message to the next."""
 _MARK = 16
 """Bytes of a message's mark, which stands before it among others."""
@@ -101,6 +101,7 @@ class Table:
         self._estimates = EstimateRows(count, PUBLISHED_NAMES, MOST_ROW_SAMPLES)
         self._kept = KeptRows(count)
         self._rows: list[Row | None] = [None] * count
+        self._sources: list[tuple[str, int, Names]] = [("", 0, ())] * count
         self._there = np.zeros(count, np.bool_)
         self._read, self._judged, self._end = np.zeros((3, count), np.int64)
         self._read_ns, self._judged_ns, self._offset_ns = np.zeros((3, count), np.int64)
@@ -108,6 +109,7 @@ class Table:
         self._latency_ms = np.zeros((count, LATENCIES))
         self._latencies = np.zeros(count, np.int64)
         self._moved: set[int] = set()
+        self._failures: list[tuple[int, Exception]] = []
         self._look_at = np.zeros(count)
         self._connected_until = 0.0
 
@@ -135,6 +137,10 @@ class Table:
         if not self._estimates.begin(number, process.bus.rig, source, row.ring.place):
             process.reader.close_row()
             return False
+        before, self._sources[number] = self._sources[number], (*source, row.names)
+        if before[:2] == source and before[2] and not self._begin(number, row, before[2]):
+            process.reader.close_row()
+            return False
         self._rows[number], self._there[number] = row, True
         self._end[number], self._offset_ns[number] = found.following, found.offset_ns
         self._heard_at[number] = time.monotonic() - process.reader.silent_for()
@@ -146,14 +152,17 @@ class Table:
         row = self._rows[number]
         if row is None:
             return False
-        if row.names:
-            return form.names == row.names
+        return form.names == row.names if row.names else self._begin(number, row, form.names)
+
+    def _begin(self, number: int, row: Row, names: Names) -> bool:
+        """Prepare a row for blocks of these channels; False if it cannot judge them."""
         channels = row.process.rig.model.channels
-        places = places_of(tuple([name for name, _, _ in form.names]), channels)
-        if places is None or not self._steady.enter(number, row.state, places, len(form.names)):
+        places = places_of(tuple([name for name, _, _ in names]), channels)
+        if places is None or not self._steady.enter(number, row.state, places, len(names)):
             return False
-        self._kept.enter(number, len(form.names), row.process.loose_samples)
-        row.names = form.names
+        self._kept.enter(number, len(names), row.process.loose_samples)
+        row.names = names
+        self._sources[number] = row.device, row.boot, names
         return True
 
     def leave(self, number: int) -> None:
@@ -186,13 +195,20 @@ class Table:
             self._kept.taken(number, (row.device, row.boot, end), row.names),
         )
 
-    def close(self, number: int) -> None:
-        """Forget a rig that has failed, with what its row has done."""
+    def close(self, number: int) -> int:
+        """Forget a rig that has failed, and what its row has done; the samples that it has read."""
+        read = int(self._read[number])
         if (row := self._rows[number]) is not None:
             row.process.reader.close_row()
         self._rows[number], self._there[number] = None, False
         self._read[number] = self._judged[number] = self._latencies[number] = 0
         self._moved.discard(number)
+        return read
+
+    def failures(self) -> list[tuple[int, Exception]]:
+        """Rigs that have failed since the last call, and why."""
+        found, self._failures = self._failures, []
+        return found
 
     # ---- what has come ------------------------------------------------------------------
 
@@ -302,7 +318,10 @@ class Table:
             return
         source = row.device, row.boot, int(self._end[number])
         if found := self._kept.taken(number, source, row.names):
-            row.process.keep_for_ranking(*found)
+            try:
+                row.process.keep_for_ranking(*found)
+            except Exception as error:  # of one rig: the others go on
+                self._failures.append((number, error))
 
     # ---- after the turn, and in between -------------------------------------------------
 
@@ -332,9 +351,16 @@ class Table:
             silent = (now - self._heard_at[due]).tolist()
             for number, silent_s in zip(due.tolist(), silent, strict=True):
                 row = self._rows[number]
-                if row is not None and not (connected and row.process.is_calm(silent_s)):
+                if row is not None and not (connected and self._is_calm(number, row, silent_s)):
                     found.append(number)
         return found
+
+    def _is_calm(self, number: int, row: Row, silent_s: float) -> bool:
+        try:
+            return row.process.is_calm(silent_s)
+        except Exception as error:  # of one rig: the others go on
+            self._failures.append((number, error))
+            return True
 
     def _is_connected(self, now: float) -> bool:
         """Whether the router is there, which is the same for all: asked now and then."""

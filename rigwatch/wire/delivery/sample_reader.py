@@ -184,7 +184,7 @@ class SampleReader:
         is told by `went_on`, before anything is read here again.
 
         Args:
-            suits: whether blocks of a form can be taken there; their device and boot are checked.
+            suits: whether blocks of a form of their device and boot can be taken there; asked once.
 
         Returns:
             (boot, seq) of the last sample that was read; None if the row remains closed.
@@ -197,9 +197,7 @@ class SampleReader:
         doubted = self._refused is not None and self._refused[0] == boot
         if not self.heard or doubted or not sender or not self._owners.admits(boot, sender):
             return None
-        source = Source(
-            sender, lambda form: form.boot == boot and form.device == device and suits(form)
-        )
+        source = Source(sender, device, boot, suits)
         opened = share.of.open(share, source, position[1] + 1, self._inbox.is_read)
         return position if opened else None
 

@@ -41,7 +41,7 @@ class JointReceiver:
         self.strange: deque[Received] = deque(maxlen=WAITING)
         self.rows: JointRows | None = None
         self._following = following
-        self._rigs: dict[str, tuple[deque[Received], ...]] = {}
+        self._rigs: dict[str, tuple[Share, ...]] = {}
         self._lock = threading.Lock()
 
     def add(self, rig: str, receive: Receive, alone: Following) -> "Share":
@@ -49,13 +49,13 @@ class JointReceiver:
         share = Share(self, rig, receive, alone)
         with self._lock:
             self._close(rig)
-            self._rigs[rig] = (*self._rigs.get(rig, ()), share.waiting)
+            self._rigs[rig] = (*self._rigs.get(rig, ()), share)
         return share
 
     def remove(self, share: "Share") -> None:
         """Keep no more for a reader."""
         with self._lock:
-            left = tuple(one for one in self._rigs.get(share.rig, ()) if one is not share.waiting)
+            left = tuple(one for one in self._rigs.get(share.rig, ()) if one is not share)
             self._rigs[share.rig] = left
             if not left:
                 del self._rigs[share.rig]
@@ -78,7 +78,8 @@ class JointReceiver:
     def open(
         self, share: "Share", source: Source, following: int, is_read: Callable[[], bool]
     ) -> bool:
-        """Open the row of a rig whose only reader this is, if nothing of it waits.
+        """Open the row of a rig whose only reader this is, if its messages come joined and none
+        waits.
 
         Args:
             share: of the reader.
@@ -88,7 +89,8 @@ class JointReceiver:
         """
         with self._lock:
             alone = len(self._rigs.get(share.rig, ())) == 1
-            if self.rows is None or not alone or share.waiting or not is_read():
+            ready = share.comes_joined and not share.waiting and is_read()
+            if self.rows is None or not alone or not ready:
                 return False
             return self.rows.open(share.rig, source, following)
 
@@ -111,8 +113,9 @@ class JointReceiver:
                 continue
             for rig, mark, payload in parts:
                 self._close(rig)
-                for waiting in self._rigs.get(rig, ()):
-                    waiting.append((payload, sender, mark))
+                for share in self._rigs.get(rig, ()):
+                    share.comes_joined = True
+                    share.waiting.append((payload, sender, mark))
 
 
 class Share:
@@ -123,10 +126,14 @@ class Share:
         rig: the rig's id.
         receive: the reader.
         alone: gives the messages that came alone.
+
+    Attributes:
+        comes_joined: whether the last message that was found had been joined.
     """
 
     def __init__(self, of: JointReceiver, rig: str, receive: Receive, alone: Following) -> None:
         self.rig, self.of = rig, of
+        self.comes_joined = False
         self.waiting: deque[Received] = deque(maxlen=WAITING)
         self._receive, self._alone = receive, alone
         self._passed = self._pause = 0
@@ -148,6 +155,7 @@ class Share:
                 break
             self.waiting.append(found)
         some = len(self.waiting) > before
+        self.comes_joined = self.comes_joined and not some
         self._passed, self._pause = 0, 0 if some else min(self._pause + 1, MOST_PASSED)
 
     def take(self) -> None:

@@ -93,10 +93,22 @@ class Batch(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """Whose samples a row takes: of one boot of a device, from one sender, and in which columns."""
+    """Whose samples a row takes.
+
+    Attributes:
+        sender: identity of the process that sends them.
+        device, boot: of which they are.
+        suits: whether blocks of such a form can be taken; asked once for each form.
+    """
 
     sender: str
+    device: str
+    boot: int
     suits: Callable[[Form], bool]
+
+    def is_of(self, form: Form) -> bool:
+        """Whether blocks of a form are of this source, and can be taken."""
+        return form.device == self.device and form.boot == self.boot and self.suits(form)
 
 
 class JointRows:
@@ -132,7 +144,7 @@ class JointRows:
         if rig in self._numbers:
             return self._numbers[rig] == row
         self._numbers = {known: at for known, at in self._numbers.items() if at != row}
-        self._numbers[rig] = row
+        self._numbers[rig], self._sources[row] = row, None
         self.state.ids[row, : len(rig)] = np.frombuffer(rig.encode(), np.uint8)
         self.state.id_size[row] = len(rig)
         self.state.slots.fill(-1)
@@ -144,7 +156,9 @@ class JointRows:
         row = self._numbers.get(rig)
         if row is None:
             return False
-        self.state.forms.facts[row] = 0
+        before = self._sources[row]
+        if before is None or (before.device, before.boot) != (source.device, source.boot):
+            self.state.forms.facts[row] = 0
         self.state.sender[row] = self._senders.setdefault(source.sender, len(self._senders))
         self.state.following[row] = following
         self._sources[row] = source
@@ -185,15 +199,16 @@ class JointRows:
         whole = bool(taken.all())
         if whole or taken.any():
             parts = parts if whole else np.ascontiguousarray(parts[:, taken])
-            rows, samples, *places = parts
-            device_us, t_ns = out[1][:, : samples.sum()]
-            self._batches.append(Batch(rows, samples, *places, device_us, t_ns, out[2], data))
+            row, n, first, at_sample, at_value, begin, end = parts
+            device_us, t_ns = out[1][:, : n.sum()]
+            places = at_sample, at_value, begin, end
+            self._batches.append(Batch(row, n, first, *places, device_us, t_ns, out[2], data))
         return [] if whole else _left(data, ~taken)
 
     def _learn(self, row: int, payload: bytes) -> None:
         """Keep the form of a block whose length is new, unless it is not of the row's source."""
         form, source = form_of(payload), self._sources[row]
-        if form is None or source is None or not source.suits(form):
+        if form is None or source is None or not source.is_of(form):
             self.state.open[row] = False
             return
         facts = self.state.forms.facts[row]
