@@ -15,7 +15,7 @@ import queue
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
@@ -153,13 +153,19 @@ class Seat:
         a failure as in `read`.
         """
         process = self._process
-        if process is None or self._due or now >= self._look_at:
+        if process is None:
+            return self.may_start(now)
+        if self._due or now >= self._look_at:
             return True
         try:
             return process.reader.may_hold()
         except Exception as error:  # as in `_alone`
             self.fail(error)
             return False
+
+    def may_start(self, now: float) -> bool:
+        """Whether it does not run, and its router has answered or another attempt is due."""
+        return self._process is None and (not self._joined.empty() or now >= self._again_at)
 
     def read(self) -> None:
         """Take what has come; a failure ends this rig's run and no other's."""
@@ -304,12 +310,7 @@ def one_turn(
     collect()
     with together():
         left = set() if tables is None else _judge_rows(seats, tables)
-        now = time.monotonic()
-        busy = [
-            (number, seat)
-            for number, seat in enumerate(seats)
-            if not seat.is_in_table and (seat.has_work(now) or number in left)
-        ]
+        busy = _busy(seats, left)
         rigs = [seat for _, seat in busy]
         for seat in rigs:
             seat.read()
@@ -322,6 +323,28 @@ def one_turn(
         seat.keep_position()
         if tables is not None:
             seat.enter(tables, number)
+
+
+def _busy(seats: Sequence[Seat], left: Container[int]) -> list[tuple[int, Seat]]:
+    """The rigs that have something to do themselves, each with its number.
+
+    Of those that start only one: to begin takes as long as hundreds of blocks of the others.
+
+    Args:
+        seats: the rigs.
+        left: those that have just left their tables.
+    """
+    now, starts = time.monotonic(), False
+    found = []
+    for number, seat in enumerate(seats):
+        if seat.is_in_table or not (seat.has_work(now) or number in left):
+            continue
+        if not seat.is_running:
+            if starts:
+                continue
+            starts = True
+        found.append((number, seat))
+    return found
 
 
 def _judge_rows(seats: Sequence[Seat], tables: Tables) -> set[int]:
