@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 from rigwatch.wire.kept_state import KeptState
-from rigwatch.wire.messages import EstimateBlock, SampleBlock
 
 
 class Rested(NamedTuple):
@@ -31,7 +30,6 @@ class Passed(NamedTuple):
         t_ns: time of the last one [ns].
         offset_ns: as in `Rested`.
         latencies_ms: time from each block to its estimates [ms].
-        kept: the newest of them, for a ranking.
     """
 
     samples: int
@@ -40,4 +38,3 @@ class Passed(NamedTuple):
     t_ns: int
     offset_ns: int
     latencies_ms: list[float]
-    kept: tuple[EstimateBlock, SampleBlock] | None

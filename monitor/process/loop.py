@@ -197,6 +197,11 @@ class MonitorProcess:
         again = position and done and position[0] == done[0] and position < done
         return done if again else position
 
+    @property
+    def is_quiet(self) -> bool:
+        """Whether the last look around has found nothing that holds, and no ranking is to begin."""
+        return self._is_calm and not self._unsuitable and not self._explainer.waits_for_samples
+
     def open_row(self, suits: Callable[[Form], bool]) -> Rested | None:
         """Leave samples to a row of a table, if they simply follow and nothing else happens.
 
@@ -207,8 +212,7 @@ class MonitorProcess:
             suits: whether blocks of a form can be judged there.
         """
         place = self._last_judged()
-        waits = self._unsuitable or self._explainer.waits_for_samples
-        if not self._is_calm or place is None or waits:
+        if not self.is_quiet or place is None:
             return None
         boot, following = place[0], place[1] + 1
         state = self.rig.at_rest(boot, following)
@@ -225,8 +229,6 @@ class MonitorProcess:
         self._delivered_s += passed.samples / self.rig.model.sample_rate
         self._estimated_s = self._delivered_s
         self._health.judged_after(passed.latencies_ms)
-        if passed.kept is not None:
-            self.keep_for_ranking(*passed.kept)
 
     def keep_for_ranking(self, estimates: EstimateBlock, samples: SampleBlock) -> None:
         """Keep what a row has judged."""

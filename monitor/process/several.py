@@ -317,12 +317,10 @@ def one_turn(
         _judge_first(rigs)
         for seat in rigs:
             seat.judge()
-    if tables is not None:
-        tables.keep_positions()
-    for number, seat in busy:
+    for _, seat in busy:
         seat.keep_position()
-        if tables is not None:
-            seat.enter(tables, number)
+    if tables is not None:
+        _keep_rows(seats, busy, tables)
 
 
 def _busy(seats: Sequence[Seat], left: Container[int]) -> list[tuple[int, Seat]]:
@@ -357,10 +355,18 @@ def _judge_rows(seats: Sequence[Seat], tables: Tables) -> set[int]:
             seats[number].leave_table()
         for one in left:
             seats[one.number].see_to(one)
-        for number, error in table.failures():
-            seats[number].fail(error)
         gone |= alone
     return gone
+
+
+def _keep_rows(seats: Sequence[Seat], busy: Iterable[tuple[int, Seat]], tables: Tables) -> None:
+    """Store the positions of the rows, end the rigs that have failed there, let others enter."""
+    for table in tables:
+        table.keep_positions()
+        for number, error in table.failures():
+            seats[number].fail(error)
+    for number, seat in busy:
+        seat.enter(tables, number)
 
 
 def _judge_first(seats: Iterable[Seat]) -> None:
@@ -429,9 +435,10 @@ def run_several(paths: list[Path]) -> int:
 
 def _prepare(loaded: Rigs) -> None:
     """Compile what the rigs need before any is watched; a seat says what is wrong with its rig."""
+    known: set[str] = set()
     for path, config in loaded:
         with contextlib.suppress(RigwatchError):
-            compile_table(prepared(config, path))
+            compile_table(prepared(config, path), known)
 
 
 def _journals(loaded: Rigs) -> Iterable[tuple[Path, str]]:

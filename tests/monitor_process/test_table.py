@@ -216,6 +216,35 @@ def test_whatever_happens_to_rigs_of_a_table_they_get_what_they_get_alone(sides)
     assert not table.remarks
 
 
+def test_a_rig_of_a_table_that_fails_starts_anew_and_no_other_notices(sides, monkeypatch) -> None:
+    monkeypatch.setattr("monitor.process.several.FIRST_PAUSE", 0.01)
+    _, table = sides
+    rigs = [[*sent(undisturbed(), seed, 0.0, 10**9)][:300] for seed in range(4)]
+    for number, blocks in enumerate(zip(*rigs, strict=True)):
+        if number == 200:
+            broken = table.seats[1]
+            assert broken.is_in_table
+            broken._pause = 0.01
+            monkeypatch.setattr(broken._process, "keep_for_ranking", _fail)
+        table.send([*blocks])
+        table.turn()
+    ends = [(1, _end(one)) for one in rigs]
+
+    def done() -> bool:
+        table.turn()
+        return [table.last(number) for number in range(4)] == ends
+
+    assert wait_until(done, PATIENCE, 0.001)
+    for number, (_, last) in enumerate(ends):
+        assert sorted(table.values(number)) == [(1, seq) for seq in range(last + 1)]
+    (said,) = table.remarks
+    assert said.endswith("the disk is gone; starts anew in 0 s")
+
+
+def _fail(*_: object) -> None:
+    raise OSError("the disk is gone")
+
+
 def _end(turns: list[list[tuple[str, SampleBlock]]]) -> int:
     return max(part.seq + len(part) - 1 for _, part in turns[-1])
 

@@ -23,12 +23,18 @@ from rigwatch.wire.messages import (
 _RIG, _BOOT, _SAMPLES = "rig", 1, 4
 
 
-def compile_table(model: RigModel) -> None:
-    """Judge a block of a separate monitor in a row, if its model has a state for one."""
-    rig, n = RigMonitor(model), _SAMPLES
+def compile_table(model: RigModel, known: set[str] | None = None) -> None:
+    """Judge a block of a separate monitor in a row, if its model has a state for one.
+
+    Args:
+        model: of the rig.
+        known: kinds of states for which that has been done; one more is added.
+    """
+    rig, n, known = RigMonitor(model), _SAMPLES, set() if known is None else known
     rig.update(_block(model, 0))
-    if (state := rig.steady()) is None:
+    if (state := rig.steady()) is None or state.kind in known:
         return
+    known.add(state.kind)
     reading, steady = JointRows(1), SteadyRows(1, MOST_ROW_COLUMNS)
     estimates = EstimateRows(1, PUBLISHED_NAMES, MOST_ROW_SAMPLES)
     reading.name(0, _RIG)

@@ -126,7 +126,7 @@ class Table:
             process: it has judged all that it has read.
             look_at: monotonic time of the next look at it [s].
         """
-        sends = process.bus.joining(ESTIMATES)
+        sends = process.bus.joining(ESTIMATES) if process.is_quiet else None
         if sends is None or not self._joint.name(number, process.bus.rig):
             return False
         found = process.open_row(lambda form: self._suits(number, form))
@@ -171,6 +171,7 @@ class Table:
         if row is None:
             return
         row.process.reader.close_row()
+        self._give_kept(number)
         self._rows[number], self._there[number] = None, False
         self._moved.discard(number)
         self._steady.leave(number)
@@ -192,7 +193,6 @@ class Table:
             int(self._judged_ns[number]),
             int(self._offset_ns[number]),
             self._latency_ms[number, :count].tolist(),
-            self._kept.taken(number, (row.device, row.boot, end), row.names),
         )
 
     def close(self, number: int) -> int:
@@ -398,8 +398,3 @@ class Tables:
     def unsettled(self) -> int:
         """Samples that were read and of which their rigs have not been told."""
         return sum(table.unsettled for table in self)
-
-    def keep_positions(self) -> None:
-        """Store the positions of the rigs whose samples have been judged."""
-        for table in self:
-            table.keep_positions()

@@ -55,6 +55,7 @@ class JointReceiver:
     def remove(self, share: "Share") -> None:
         """Keep no more for a reader."""
         with self._lock:
+            self._close(share.rig)
             left = tuple(one for one in self._rigs.get(share.rig, ()) if one is not share)
             self._rigs[share.rig] = left
             if not left:
