@@ -1,13 +1,12 @@
 """What a block of nine samples costs in a daq and in a monitor of several rigs, without the bus.
 
-    lines in memory ─▶ daq's chains ─▶ blocks ─▶ the monitor's seats ─▶ estimates
+    lines in memory ─▶ daq's chains ─▶ joined blocks ─▶ the monitor's seats ─▶ joined estimates
 
 One process, a bus in memory, cycles in real time: what the code takes in a process that wakes for a
 moment, without Zenoh and other processes (`many_rigs_chain`). Of many cycles the tenth that other
 work disturbed least counts.
 """
 
-import contextlib
 import time
 from collections.abc import Callable, Iterator
 from itertools import islice
@@ -24,13 +23,16 @@ from daq.adapters.serial_line import SerialAdapter
 from monitor.model import load_model
 from monitor.pipeline import compile_together
 from monitor.process.several import Seat, one_turn
+from monitor.process.table import Tables, compile_table
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.host import Heartbeat
+from rigwatch.wire.messages import ESTIMATES
 from rigwatch.wire.rig_config import load_rig
+from tests.many_rigs.memory_links import MemoryLinks
 from tests.waiting import eventually
 from tools.benchmark_table import Row
 
-RIGS, BLOCK = 16, 9
+RIGS, BLOCK = (16, 48), 9
 """Rigs of a process, and samples that each has in a cycle."""
 WARM_UP = 300
 """Cycles that are not counted: clocks find their line, and references their period."""
@@ -40,11 +42,14 @@ LEAST = 10
 
 def run(quick: bool) -> list[Row]:
     """The rows of this benchmark."""
-    cycles = 300 if quick else 1500
+    return [row for rigs in RIGS for row in rows_of(rigs, 300 if quick else 1500)]
+
+
+def rows_of(rigs: int, cycles: int) -> list[Row]:
+    """The rows of so many rigs."""
     with TemporaryDirectory(prefix="rigwatch-blocks-") as name:
-        paths = rig_files(Path(name), RIGS)
-        daq, monitor = measured(paths, cycles)
-    what = f"a block of {BLOCK} samples, {RIGS} rigs in one process, bus in memory"
+        daq, monitor = measured(rig_files(Path(name), rigs), cycles)
+    what = f"a block of {BLOCK} samples, {rigs} rigs in one process, bus in memory"
     return [
         Row(f"{what}: daq", f"{daq:.0f} µs", "", "", "from the line's bytes to the message", None),
         Row(f"{what}: monitor", f"{monitor:.0f} µs", "", "", "from message to message", None),
@@ -54,14 +59,33 @@ def run(quick: bool) -> list[Row]:
 def measured(paths: list[Path], cycles: int) -> tuple[float, float]:
     """Processor time of a block in daq and in the monitor [µs]."""
     network = MemoryNetwork()
-    compile_together(load_model(MODEL))
+    of_daq, links, of_listener = (MemoryLinks(network) for _ in range(3))
+    model = load_model(MODEL)
+    compile_together(model)
+    compile_table(model)
     lines = [Line() for _ in paths]
-    chains = [_chain(path, line, network) for path, line in zip(paths, lines, strict=True)]
+    chains = [_chain(path, line, of_daq) for path, line in zip(paths, lines, strict=True)]
+    heard = [of_listener.bus(path.stem, "listener").subscribe(ESTIMATES) for path in paths]
     seats = [
-        Seat(path, print, lambda config, process: network.bus(config.rig.id, process))
+        Seat(path, print, lambda config, process: links.bus(config.rig.id, process))
         for path in paths
     ]
-    eventually(lambda: _all_run(seats), "all rigs")
+    tables = Tables(len(seats))
+
+    def turn() -> None:
+        one_turn(seats, links.together, links.collect, tables)
+
+    def all_run() -> bool:
+        turn()
+        return all(seat.is_running for seat in seats)
+
+    def step() -> None:
+        with of_daq.together():
+            for chain in chains:
+                chain.step(0.0)
+
+    eventually(all_run, "all rigs")
+    counted = 0
     spent: tuple[list[float], list[float]] = [], []
     began = time.monotonic()
     for number, data in enumerate(_readings(WARM_UP + cycles)):
@@ -69,9 +93,11 @@ def measured(paths: list[Path], cycles: int) -> tuple[float, float]:
             line.put(data)
         # In real time: the clocks of device and host are compared.
         time.sleep(max(0.0, began + number * BLOCK / RATE - time.monotonic()))
-        spent[0].append(_processor_time(lambda: _step(chains)))
-        spent[1].append(_processor_time(lambda: one_turn(seats, contextlib.nullcontext)))
-    assert all(seat.delivered >= cycles * BLOCK for seat in seats), "samples did not arrive"
+        spent[0].append(_processor_time(step))
+        spent[1].append(_processor_time(turn))
+        of_listener.collect()
+        counted += sum(len(block) for one in heard for block in one.drain())
+    assert counted >= len(paths) * cycles * BLOCK, "estimates did not arrive"
     for seat in seats:
         seat.close()
     daq, monitor = (float(np.percentile(one[WARM_UP:], LEAST)) for one in spent)
@@ -100,22 +126,12 @@ class Line:
         """Nothing to close."""
 
 
-def _chain(path: Path, line: Line, network: MemoryNetwork) -> Chain:
+def _chain(path: Path, line: Line, links: MemoryLinks) -> Chain:
     config = load_rig(path)
     adapter = SerialAdapter(line, len(config.channels))
-    chain = Chain(config, adapter, network.bus(config.rig.id, "daq"), Heartbeat("daq"))
+    chain = Chain(config, adapter, links.bus(config.rig.id, "daq"), Heartbeat("daq"))
     chain.device.start()
     return chain
-
-
-def _step(chains: list[Chain]) -> None:
-    for chain in chains:
-        chain.step(0.0)
-
-
-def _all_run(seats: list[Seat]) -> bool:
-    one_turn(seats, contextlib.nullcontext)
-    return all(seat.is_running for seat in seats)
 
 
 def _readings(count: int) -> Iterator[bytes]:

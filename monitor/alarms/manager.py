@@ -256,6 +256,20 @@ class AlarmManager:
             self._at_rest = idle and not self._inherited
         return self._at_rest
 
+    def is_at_rest(self, boot: int, seq: int) -> bool:
+        """Whether samples from this one on change nothing as long as no condition holds."""
+        return self._due_ns is None and self._next == (boot, seq) and self.is_idle
+
+    def went_on(self, boot: int, seq: int, t_ns: int) -> None:
+        """Samples at which no condition holds have come since `is_at_rest`.
+
+        Args:
+            boot, seq: the sample after them.
+            t_ns: time of the last one [ns].
+        """
+        self._next = boot, seq
+        self._advance(t_ns)
+
     def _follow(self, boot: int, seq: int, count: int) -> None:
         """Interrupt the debouncers where the samples do not follow the last ones."""
         before, self._next = self._next, (boot, seq + count)

@@ -1,5 +1,5 @@
 """Ranks the probable cause of an active alarm, in a separate process."""
 
-from monitor.diagnosis.background_ranking import Explainer
+from monitor.diagnosis.background_ranking import JOINED, Explainer
 
-__all__ = ["Explainer"]
+__all__ = ["JOINED", "Explainer"]

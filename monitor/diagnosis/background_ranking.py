@@ -94,6 +94,21 @@ class Explainer:
         while self._judged and self._judged[0][0].seq < block.seq - KEPT * rate:
             self._judged.popleft()
 
+    @property
+    def has_results(self) -> bool:
+        """Whether answers wait."""
+        return not self._results.empty()
+
+    @property
+    def waits_for_samples(self) -> bool:
+        """Whether a ranking begins once enough samples have come."""
+        return self._wanted is not None
+
+    @property
+    def loose(self) -> int:
+        """Samples kept that are not joined yet: at `JOINED` they are."""
+        return sum(len(block) for block, _ in self._loose)
+
     def hear(self, alarm: Alarm) -> None:
         """Request an explanation if an alarm needs one, once per onset."""
         if alarm.name == "stiction" and alarm.state == "unacknowledged":

@@ -60,7 +60,7 @@ PUBLISHED: tuple[tuple[str, str, int], ...] = (
     ("together", "", w.TOGETHER),
 )
 """Columns of an estimate block: name, unit, index in the kernel's output, where they come first."""
-_NAMES = tuple((name, unit) for name, unit, _ in PUBLISHED)
+PUBLISHED_NAMES = tuple((name, unit) for name, unit, _ in PUBLISHED)
 PUBLISHED_ROWS = slice(len(PUBLISHED))
 """Rows of the kernel's output that are published; a slice, so that none is copied."""
 
@@ -126,9 +126,9 @@ class Monitor:
         own = self._all_conditions(out[:, kept], run, admitted.missing, reset[kept])
         return Result(estimates, (*own, *clipping))
 
-    def follows(self, block: SampleBlock) -> bool:
-        """Whether a block continues the last one, and nothing is pending from before it."""
-        return self._missing == 0 and self._admission.continues(block)
+    def follows(self, boot: int, seq: int) -> bool:
+        """Whether a sample continues the last one, and nothing is pending from before it."""
+        return self._missing == 0 and self._admission.continues(boot, seq)
 
     def steady(self) -> KeptState | None:
         """The state that `judge_steady` continues with blocks that follow; None if it cannot."""
@@ -149,10 +149,14 @@ class Monitor:
             )
         return self._steady
 
+    def went_on(self, samples: int) -> None:
+        """So many samples that follow have been judged by the kernel of `steady`."""
+        self._admission.passed(samples)
+
     def passed(self, block: SampleBlock, published: FloatArray) -> EstimateBlock:
         """The estimates of a block that `judge_steady` has judged, from `PUBLISHED_ROWS`."""
-        self._admission.passed(len(block))
-        columns = ColumnTable(_NAMES, published)
+        self.went_on(len(block))
+        columns = ColumnTable(PUBLISHED_NAMES, published)
         return EstimateBlock(block.device, block.boot, block.seq, block.t_ns, columns)
 
     def steady_conditions(
@@ -205,7 +209,7 @@ class Monitor:
     def _estimates(self, block: SampleBlock, out: FloatArray) -> EstimateBlock:
         skipped = len(block) - out.shape[1]
         seq, t_ns = block.seq + skipped, block.t_ns[skipped:]
-        columns = ColumnTable(_NAMES, out[PUBLISHED_ROWS])
+        columns = ColumnTable(PUBLISHED_NAMES, out[PUBLISHED_ROWS])
         return EstimateBlock(block.device, block.boot, seq, t_ns, columns)
 
     def _all_conditions(

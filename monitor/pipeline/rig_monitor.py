@@ -102,13 +102,39 @@ class RigMonitor:
         """Whether a block can be judged together with others (`together.py`): it continues the
         last one, and no detector or check needs its samples.
         """
+        return self._follows(block.boot, block.seq)
+
+    def _follows(self, boot: int, seq: int) -> bool:
         return (
             isinstance(self._pipeline, Monitor)
             and not self._detectors
-            and self._pipeline.follows(block)
-            and self._sensors.is_clean(block.boot)
-            and (self._wiring is None or self._wiring.has_passed(block))
+            and self._pipeline.follows(boot, seq)
+            and self._sensors.is_clean(boot)
+            and (self._wiring is None or self._wiring.has_passed(boot))
         )
+
+    def at_rest(self, boot: int, seq: int) -> KeptState | None:
+        """The state with which samples from this one on are judged in a row; None for none.
+
+        As long as no condition holds at any of them, `went_on` tells all that they change here.
+        """
+        if not self._follows(boot, seq) or not self.alarms.is_at_rest(boot, seq):
+            return None
+        return self.steady()
+
+    def went_on(self, samples: int, boot: int, seq: int, t_ns: int) -> None:
+        """So many samples have been judged in a row since `at_rest`.
+
+        Args:
+            samples: their number.
+            boot, seq: the sample after them.
+            t_ns: time of the last one [ns].
+        """
+        assert isinstance(self._pipeline, Monitor)
+        self._pipeline.went_on(samples)
+        if self._wiring is not None:
+            self._wiring.went_on(samples)
+        self.alarms.went_on(boot, seq, t_ns)
 
     def steady(self) -> KeptState | None:
         """The state that `judge_steady` continues with blocks that follow; None if it cannot."""

@@ -112,6 +112,98 @@ def judge_steady(  # noqa: PLR0917
         )
 
 
+class RowOutputs(NamedTuple):
+    """Results of blocks of any lengths, one after the other, of rigs with up to m channels.
+
+    Attributes:
+        columns: of `watch_block`, OUTPUTS values for each sample, shape (OUTPUTS, n) of a block.
+        reset: where filters were reset, shape (samples,).
+        clipping: m values for each sample, of which (n, channels) of a block are used.
+        judged, holds: as in `Outputs`.
+    """
+
+    columns: FloatArray
+    reset: BoolArray
+    clipping: FloatArray
+    judged: BoolArray
+    holds: BoolArray
+
+    def of(self, place: int, at: int, samples: int, channels: int) -> Outputs:
+        """Those of one block, which has so many samples before it."""
+        columns = self.columns[w.OUTPUTS * at : w.OUTPUTS * (at + samples)]
+        widest = self.clipping.size // max(1, self.reset.size)
+        clipping = self.clipping[widest * at :][: samples * channels]
+        return Outputs(
+            columns.reshape(1, w.OUTPUTS, samples),
+            self.reset[at : at + samples].reshape(1, samples),
+            clipping.reshape(1, samples, channels),
+            self.judged[place : place + 1],
+            self.holds[place : place + 1],
+        )
+
+
+def new_row_outputs(blocks: int, samples: int, channels: int) -> RowOutputs:
+    """Outputs to be filled, of so many blocks and samples."""
+    return RowOutputs(
+        np.zeros(w.OUTPUTS * samples),
+        np.zeros(samples, np.bool_),
+        np.zeros(samples * channels),
+        np.zeros(blocks, np.bool_),
+        np.zeros(blocks, np.bool_),
+    )
+
+
+@kernel()
+def judge_rows(  # noqa: PLR0917
+    like: Any,
+    addresses: IntArray,
+    places: IntArray,
+    channels: IntArray,
+    columns: IntArray,
+    rows: IntArray,
+    samples: IntArray,
+    first: IntArray,
+    at: IntArray,
+    values_at: IntArray,
+    wanted: BoolArray,
+    values: FloatArray,
+    device_us: IntArray,
+    out: RowOutputs,
+) -> None:
+    """Judge blocks of any lengths as `judge_steady` does, each of another row.
+
+    Args:
+        like: the `SteadyState` of any row.
+        addresses: of the rows' states, shape (rows,).
+        places: where the model's channels are among a block's, shape (rows, any).
+        channels, columns: number of the model's channels, and of a block's, shape (rows,).
+        rows: of the blocks, shape (k,).
+        samples, first: of each block, shape (k,).
+        at, values_at: samples and values before each block, shape (k,).
+        wanted: whether a block is to be judged, shape (k,); none has a flag.
+        values: of all blocks, each of shape (columns, n).
+        device_us: of all blocks.
+        out: filled.
+    """
+    widest = places.shape[1]
+    for k in range(rows.size):
+        if not wanted[k]:
+            continue
+        row, n = rows[k], samples[k]
+        begin, end, m, c = at[k], at[k] + n, channels[row], columns[row]
+        out.judged[k] = _judge(
+            kept(like, addresses[row]),
+            values[values_at[k] : values_at[k] + c * n].reshape((c, n)),
+            places[row, :m],
+            device_us[begin:end],
+            first[k],
+            out.columns[w.OUTPUTS * begin : w.OUTPUTS * end].reshape((w.OUTPUTS, n)),
+            out.reset[begin:end],
+            out.clipping[widest * begin : widest * begin + n * m].reshape((n, m)),
+            out.holds[k : k + 1],
+        )
+
+
 @part(allocates=True)
 def _judge(  # noqa: PLR0917
     state: SteadyState,

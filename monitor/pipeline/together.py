@@ -40,7 +40,7 @@ def ready_of(rig: RigMonitor, block: SampleBlock) -> Ready | None:
     """The block, if it follows the last one (`RigMonitor.follows`) and has the model's channels."""
     state = rig.steady() if rig.follows(block) else None
     names = tuple([channel.name for channel in block.channels])
-    rows = _rows(names, rig.model.channels)
+    rows = places_of(names, rig.model.channels)
     if state is None or rows is None:
         return None
     alike = state.kind, len(block), tuple([len(channel.quality) for channel in block.channels])
@@ -48,7 +48,7 @@ def ready_of(rig: RigMonitor, block: SampleBlock) -> Ready | None:
 
 
 @lru_cache(maxsize=64)
-def _rows(names: tuple[str, ...], wanted: tuple[str, ...]) -> list[int] | None:
+def places_of(names: tuple[str, ...], wanted: tuple[str, ...]) -> list[int] | None:
     """The places of the wanted names among these; None if one is not there."""
     return [names.index(name) for name in wanted] if set(names).issuperset(wanted) else None
 

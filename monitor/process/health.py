@@ -28,9 +28,17 @@ class HealthBook:
         """Record that estimates of a sample taken at `sample_ns` are published at `now_ns` [ns]."""
         self._latency_ms.append((now_ns - sample_ns) / 1e6)
 
+    def judged_after(self, latencies_ms: list[float]) -> None:
+        """The same of several samples, by the time from each to its estimates [ms]."""
+        self._latency_ms.extend(latencies_ms)
+
+    def will_be_due(self, now_ns: int) -> bool:
+        """Whether the next message is due at this moment [ns]."""
+        return now_ns - self._said_ns >= INTERVAL_NS
+
     def is_due(self, now_ns: int) -> bool:
         """Whether a second has passed since the last message; `now_ns` is monotonic [ns]."""
-        if now_ns - self._said_ns < INTERVAL_NS:
+        if not self.will_be_due(now_ns):
             return False
         self._said_ns = now_ns
         return True

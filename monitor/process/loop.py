@@ -6,7 +6,7 @@ commands ─▶ alarms ─┘          link, silence, losses ─▶ alarms
 
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from monitor.pipeline import (
     ready_of,
 )
 from monitor.process.cursor import Cursor
+from monitor.process.handover import Passed, Rested
 from monitor.process.health import HealthBook
 from monitor.process.key_watch import KeyWatch
 from monitor.process.link_watch import (
@@ -72,7 +73,9 @@ from rigwatch.wire.messages import (
     HEALTH,
     MODELS,
     Alarm,
+    EstimateBlock,
     Event,
+    Form,
     Gap,
     Health,
     SampleBlock,
@@ -132,7 +135,7 @@ class MonitorProcess:
         self._delivered_s = self._estimated_s = 0.0
         self._router_lost_at: float | None = None
         self._recorder: Health | None = None
-        self._unsuitable = ""
+        self._unsuitable, self._is_calm = "", False
         self._standing = self.rig.alarms.standing()
         check = CommandCheck(bus, config.bus.security)
         self._operators = OperatorDesk(bus, check)
@@ -194,8 +197,83 @@ class MonitorProcess:
         again = position and done and position[0] == done[0] and position < done
         return done if again else position
 
+    @property
+    def is_quiet(self) -> bool:
+        """Whether the last look around has found nothing that holds, and no ranking is to begin."""
+        return self._is_calm and not self._unsuitable and not self._explainer.waits_for_samples
+
+    def open_row(self, suits: Callable[[Form], bool]) -> Rested | None:
+        """Leave samples to a row of a table, if they simply follow and nothing else happens.
+
+        All that was read has been judged. What the row does is told by `went_on` before anything
+        else is done here.
+
+        Args:
+            suits: whether blocks of a form can be judged there.
+        """
+        place = self._last_judged()
+        if not self.is_quiet or place is None:
+            return None
+        boot, following = place[0], place[1] + 1
+        state = self.rig.at_rest(boot, following)
+        if state is None or self.reader.open_row(suits) != place:
+            self.reader.close_row()
+            return None
+        return Rested(self.reader.device, boot, following, state, self._time.offset_ns)
+
+    def went_on(self, passed: Passed) -> None:
+        """A row has judged samples since `open_row`, and published their estimates."""
+        self.rig.went_on(passed.samples, passed.boot, passed.following, passed.t_ns)
+        self._judged_ns = passed.t_ns
+        self._time.follow(passed.offset_ns)
+        self._delivered_s += passed.samples / self.rig.model.sample_rate
+        self._estimated_s = self._delivered_s
+        self._health.judged_after(passed.latencies_ms)
+
+    def keep_for_ranking(self, estimates: EstimateBlock, samples: SampleBlock) -> None:
+        """Keep what a row has judged."""
+        self._explainer.take(estimates, samples)
+
+    @property
+    def loose_samples(self) -> int:
+        """Samples that are kept for a ranking in blocks as they came."""
+        return self._explainer.loose
+
+    @property
+    def cursor(self) -> Cursor | None:
+        """Where the position is kept."""
+        return self._cursor
+
+    def is_calm(self, silent_s: float) -> bool:
+        """Whether a look around would find what the last one found: nothing that holds.
+
+        Args:
+            silent_s: time since the last sample [s].
+        """
+        return (
+            self._is_calm
+            and silent_s <= self._stale_after
+            and not self._health.will_be_due(time.monotonic_ns())
+            and self._hears_nothing_new()
+            and not self._operators.has_some
+            and not self._models.has_some
+            and not self._explainer.has_results
+            and (self._recorder is None or self._recorder_presence.has_token)
+            and not self.reader.has_some_alone
+        )
+
+    def _hears_nothing_new(self) -> bool:
+        """Whether daq and recorder say nothing, or nothing that has to be told."""
+        if not len(self._of_daq) and not len(self._of_recorder):
+            return True
+        self._hear_of_others()
+        if self._daq_trouble or self._two_devices:
+            return False
+        return not any(holds for *_, holds in self._reports_of_others())
+
     def look_around(self) -> None:
         """Execute commands, check the link, publish the health."""
+        self._is_calm = False
         now_ns = self._now_ns()
         for announced in self._operators.execute(self.rig.alarms, now_ns, self._last_judged()):
             self.say(announced)
@@ -204,10 +282,12 @@ class MonitorProcess:
             self.bus.publish(EVENTS, event)
         seen = self._seen()
         self.say(self.rig.alarms.pass_to(now_ns))
+        calm = True
         for name, cause, holds in self._reports(seen):
             if self.rig.alarms.holds(name) != holds:
                 at = occasion(seen, cause, now_ns)
                 self.say(self.rig.alarms.report(name, at, active=holds))
+            calm = calm and not holds
         if reason := self._links.lasting_reason(seen):
             self.say(self.rig.alarms.reword("link", reason, now_ns))
         self._shelf = shelf_of(self.rig.alarms)
@@ -215,6 +295,7 @@ class MonitorProcess:
         self._announce_clock_step(seen)
         if self._health.is_due(seen.monotonic_ns):
             self._tell_health(seen)
+        self._is_calm = calm and self._router_lost_at is None
 
     def _now_ns(self, sample_ns: int | None = None) -> int:
         """The time by which alarms count [ns]; `sample_ns` is that of a sample that has come."""
@@ -226,13 +307,17 @@ class MonitorProcess:
     def _reports(self, seen: Seen) -> Iterator[Report]:
         """The alarms that no sample raises."""
         yield from self._links.reports(seen)
+        yield from self._reports_of_others()
+        yield from self._keys.reports(seen)
+
+    def _reports_of_others(self) -> Iterator[Report]:
+        """Those of what daq and recorder have said last, and of the journal."""
         unjudged = self._delivered_s - self._estimated_s
         yield from device_reports(self._daq, unjudged, self._unsuitable)
         failure = self._journal.failure if self._journal else ""
         there = self._recorder_presence.holds(time.monotonic())
         absence = "" if there else self._absence("recorder")
         yield from disk_reports(self._recorder, absence, failure)
-        yield from self._keys.reports(seen)
 
     def _announce_router(self, seen: Seen) -> None:
         """Report to subscribers that the router was unavailable."""
@@ -363,6 +448,11 @@ class MonitorProcess:
             self._recorder = None if health.state == "stopped" else health
             self._recorder_presence.heard(time.monotonic())
 
+    @property
+    def _two_devices(self) -> bool:
+        """Whether daq says that two devices speak."""
+        return self._daq is not None and self._daq.state == "two devices"
+
     def _seen(self) -> Seen:
         self._hear_of_others()
         daq_there = self._daq_there()
@@ -377,7 +467,7 @@ class MonitorProcess:
             silent,
             self._daq_trouble if daq_there else self._absence("daq"),
             self.reader.heard,
-            self.reader.contested or (self._daq is not None and self._daq.state == "two devices"),
+            self.reader.contested or self._two_devices,
             self._device,
             self.reader.position or (0, -1),
         )

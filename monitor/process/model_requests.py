@@ -73,6 +73,11 @@ class ModelDesk:
         self._waiting: queue.SimpleQueue[_Waiting] = queue.SimpleQueue()
         self._close = bus.serve(KEY, self._take)
 
+    @property
+    def has_some(self) -> bool:
+        """Whether requests wait."""
+        return not self._waiting.empty()
+
     def changes(self, place: Place) -> list[ModelChange]:
         """Apply waiting requests in the monitor's own thread; return the messages to publish."""
         found = []

@@ -30,6 +30,11 @@ class OperatorDesk:
         self._check = check
 
     @property
+    def has_some(self) -> bool:
+        """Whether commands wait."""
+        return len(self._commands) > 0
+
+    @property
     def counters(self) -> dict[str, float]:
         """Commands refused because of their sender, and commands lost in a flood."""
         lost = self._commands.dropped + self._commands.rejected + self._commands.refused

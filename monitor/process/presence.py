@@ -22,6 +22,11 @@ class Presence:
             self.heard(now)
         self._token = alive
 
+    @property
+    def has_token(self) -> bool:
+        """Whether its token is there."""
+        return self._token
+
     def heard(self, now: float) -> None:
         """A message of it came at monotonic time `now` [s]."""
         self._since = max(self._since, now)

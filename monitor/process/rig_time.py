@@ -41,6 +41,17 @@ class RigTime:
         self._offset_ns = offset
         return before - offset if before - offset > APART_NS else 0
 
+    @property
+    def offset_ns(self) -> int:
+        """This time less monotonic time [ns]."""
+        return self._offset_ns
+
+    def follow(self, offset_ns: int) -> None:
+        """The machine's clock has been followed to this offset, of which none was `APART_NS` back,
+        by samples none of which was so far ahead.
+        """
+        self._offset_ns = offset_ns
+
     def now(self, monotonic_ns: int) -> int:
         """This time at a moment [ns]."""
         return monotonic_ns + self._offset_ns

@@ -15,19 +15,20 @@ import queue
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from monitor.model import RigModel
-from monitor.pipeline import Finish, Ready, judge_together
+from monitor.pipeline import Finish, Ready, completed, judge_together
 from monitor.process.loop import (
     LONGEST_BLOCK,
     MonitorProcess,
     prepared,
 )
+from monitor.process.table import Left, Table, Tables, compile_table
 from rigwatch.wire.bus import Bus, SharedLinks, connect
 from rigwatch.wire.delivery import Item
 from rigwatch.wire.errors import RigwatchError, line_about
@@ -90,6 +91,8 @@ class Seat:
         self._before = 0
         self._settled = False
         self._look_at = 0.0
+        self._table: Table | None = None
+        self._number = 0
         self._connect()
 
     @property
@@ -106,20 +109,63 @@ class Seat:
     @property
     def waits(self) -> str:
         """Why there are no samples to come: no bus yet, no daq, or no device; else empty."""
+        if self._table is not None:
+            return ""
         return NO_ROUTER if self._process is None else self._process.waits()
+
+    @property
+    def is_in_table(self) -> bool:
+        """Whether a row does for now what is to be done."""
+        return self._table is not None
+
+    def enter(self, tables: Tables, number: int) -> None:
+        """Leave to a row what simply follows, if there is nothing else; a failure as in `read`."""
+        if self._process is not None and not self._due:
+            self._number = number
+            self._alone(partial(self._enter_table, tables), self._process)
+
+    def _enter_table(self, tables: Tables, process: MonitorProcess) -> None:
+        if (joint := process.reader.joint) is not None:
+            table = tables.of(joint)
+            if table.enter(self._number, process, self._look_at):
+                self._table = table
+
+    def leave_table(self) -> None:
+        """Go on by itself, beginning with a look around; a failure as in `read`."""
+        table, self._table, self._look_at = self._table, None, 0.0
+        if table is not None and self._process is not None:
+            self._alone(lambda _: table.leave(self._number), self._process)
+
+    def see_to(self, left: Left) -> None:
+        """Go on with a block that a row has taken; a failure as in `read`."""
+        process, outputs = self._process, left.outputs
+        if process is None:
+            return
+        if outputs is None:
+            self._due.append(left.block)
+            return
+        self._settled = True
+        judged = partial(completed, process.rig, left.block, outputs)
+        self._alone(lambda process: process.take_judged(left.block, judged()), process)
 
     def has_work(self, now: float) -> bool:
         """Whether something has come, is to be judged, or is due at monotonic time `now` [s];
         a failure as in `read`.
         """
         process = self._process
-        if process is None or self._due or now >= self._look_at:
+        if process is None:
+            return self.may_start(now)
+        if self._due or now >= self._look_at:
             return True
         try:
             return process.reader.may_hold()
         except Exception as error:  # as in `_alone`
-            self._fail(error)
+            self.fail(error)
             return False
+
+    def may_start(self, now: float) -> bool:
+        """Whether it does not run, and its router has answered or another attempt is due."""
+        return self._process is None and (not self._joined.empty() or now >= self._again_at)
 
     def read(self) -> None:
         """Take what has come; a failure ends this rig's run and no other's."""
@@ -137,7 +183,7 @@ class Seat:
         try:
             work(process)
         except Exception as error:  # whatever is wrong with one rig, the others are watched
-            self._fail(error)
+            self.fail(error)
 
     def _read(self, process: MonitorProcess) -> None:
         if not self._due:
@@ -205,7 +251,8 @@ class Seat:
             self._again_at = float("inf")
             self._connect()
 
-    def _fail(self, error: Exception) -> None:
+    def fail(self, error: Exception) -> None:
+        """End this run of the rig; it starts anew after a pause."""
         self._before = self.delivered
         self.close()
         self._wait(error)
@@ -218,6 +265,9 @@ class Seat:
     def close(self) -> None:
         """Leave the rig's bus."""
         process, self._process = self._process, None
+        table, self._table = self._table, None
+        if table is not None:
+            self._before += table.close(self._number)
         self._due.clear()
         if process is None:
             return
@@ -242,9 +292,10 @@ def _divided(items: Iterable[Item]) -> Iterable[Item]:
 
 
 def one_turn(
-    seats: Iterable[Seat],
+    seats: Sequence[Seat],
     together: Callable[[], AbstractContextManager[object]],
     collect: Callable[[], None] = _nothing,
+    tables: Tables | None = None,
 ) -> None:
     """Judge what has come of all rigs, send it, and only then store the positions.
 
@@ -254,18 +305,68 @@ def one_turn(
         seats: the rigs.
         together: entered for the turn, so that what it sends leaves together.
         collect: hands each rig what has come for several.
+        tables: do what simply follows; None for nothing.
     """
     collect()
-    now = time.monotonic()
-    busy = [seat for seat in seats if seat.has_work(now)]
     with together():
-        for seat in busy:
+        left = set() if tables is None else _judge_rows(seats, tables)
+        busy = _busy(seats, left)
+        rigs = [seat for _, seat in busy]
+        for seat in rigs:
             seat.read()
-        _judge_first(busy)
-        for seat in busy:
+        _judge_first(rigs)
+        for seat in rigs:
             seat.judge()
-    for seat in busy:
+    for _, seat in busy:
         seat.keep_position()
+    if tables is not None:
+        _keep_rows(seats, busy, tables)
+
+
+def _busy(seats: Sequence[Seat], left: Container[int]) -> list[tuple[int, Seat]]:
+    """The rigs that have something to do themselves, each with its number.
+
+    Of those that start only one: to begin takes as long as hundreds of blocks of the others.
+
+    Args:
+        seats: the rigs.
+        left: those that have just left their tables.
+    """
+    now, starts = time.monotonic(), False
+    found = []
+    for number, seat in enumerate(seats):
+        if seat.is_in_table or not (seat.has_work(now) or number in left):
+            continue
+        if not seat.is_running:
+            if starts:
+                continue
+            starts = True
+        found.append((number, seat))
+    return found
+
+
+def _judge_rows(seats: Sequence[Seat], tables: Tables) -> set[int]:
+    """Judge what rows have taken; the rigs that have left their tables."""
+    gone: set[int] = set()
+    for table in tables:
+        left = table.judge()
+        alone = {one.number for one in left}.union(table.restless(time.monotonic(), LOOK_EVERY))
+        for number in alone:
+            seats[number].leave_table()
+        for one in left:
+            seats[one.number].see_to(one)
+        gone |= alone
+    return gone
+
+
+def _keep_rows(seats: Sequence[Seat], busy: Iterable[tuple[int, Seat]], tables: Tables) -> None:
+    """Store the positions of the rows, end the rigs that have failed there, let others enter."""
+    for table in tables:
+        table.keep_positions()
+        for number, error in table.failures():
+            seats[number].fail(error)
+    for number, seat in busy:
+        seat.enter(tables, number)
 
 
 def _judge_first(seats: Iterable[Seat]) -> None:
@@ -283,6 +384,8 @@ def take_turns(
     heartbeat: Heartbeat,
     together: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
     collect: Callable[[], None] = _nothing,
+    *,
+    tables: Tables | None = None,
 ) -> None:
     """The loop over all rigs until `stop` is set.
 
@@ -290,16 +393,17 @@ def take_turns(
         seats: the rigs.
         stop: ends the loop.
         heartbeat: of the process.
-        together, collect: for each turn, see `one_turn`.
+        together, collect, tables: for each turn, see `one_turn`.
     """
     tell_at = 0.0
     while not stop.is_set():
         began = time.monotonic()
-        one_turn(seats, together, collect)
+        one_turn(seats, together, collect, tables)
         if began >= tell_at:
             tell_at = began + LOOK_EVERY
             waits = waits_of(seat.waits for seat in seats)
-            heartbeat.advance(sum(seat.delivered for seat in seats), waits)
+            in_rows = 0 if tables is None else tables.unsettled
+            heartbeat.advance(sum(seat.delivered for seat in seats) + in_rows, waits)
         stop.wait(max(0.0, began + TURN - time.monotonic()))
 
 
@@ -320,7 +424,8 @@ def run_several(paths: list[Path]) -> int:
     links = SharedLinks(len(paths))
     seats = [Seat(path, _log.warning, partial(connect, links=links)) for path in paths]
     heartbeat.ready()
-    take_turns(seats, stop, heartbeat, links.together, links.collect)
+    tables = Tables(len(seats))
+    take_turns(seats, stop, heartbeat, links.together, links.collect, tables=tables)
     heartbeat.stopping()
     for seat in seats:
         seat.close()
@@ -330,9 +435,10 @@ def run_several(paths: list[Path]) -> int:
 
 def _prepare(loaded: Rigs) -> None:
     """Compile what the rigs need before any is watched; a seat says what is wrong with its rig."""
+    known: set[str] = set()
     for path, config in loaded:
         with contextlib.suppress(RigwatchError):
-            prepared(config, path)
+            compile_table(prepared(config, path), known)
 
 
 def _journals(loaded: Rigs) -> Iterable[tuple[Path, str]]:

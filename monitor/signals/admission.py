@@ -145,9 +145,9 @@ class Admission:
             self._needed, self._last, self._run, self._clock, self._hold, self._period_us
         )
 
-    def continues(self, block: SampleBlock) -> bool:
-        """Whether a block follows the last one of a boot that has had a good sample."""
-        return block.boot == self._boot and block.seq == self._next and not self._fresh
+    def continues(self, boot: int, seq: int) -> bool:
+        """Whether a sample follows the last one of a boot that has had a good one."""
+        return boot == self._boot and seq == self._next and not self._fresh
 
     def passed(self, samples: int) -> None:
         """So many samples have been admitted by `admit_steady`."""

@@ -112,9 +112,13 @@ class WiringCheck:
             if self._failed == name
         )
 
-    def has_passed(self, block: SampleBlock) -> bool:
-        """Whether no sample of a block is in doubt, as the wiring has passed."""
-        return self._passed and block.boot == self._boot
+    def has_passed(self, boot: int) -> bool:
+        """Whether no sample of a boot is in doubt, as the wiring has passed."""
+        return self._passed and boot == self._boot
+
+    def went_on(self, samples: int) -> None:
+        """So many samples have followed, none of them in doubt."""
+        self._next += samples
 
     def _first_failed(self, block: SampleBlock, doubted: BoolArray) -> int:
         """The first sample at which the wiring counts as wrong; the block's length if none.

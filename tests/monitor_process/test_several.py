@@ -19,7 +19,7 @@ from tests.bus.publisher import wave
 from tests.bus.rig import TestRig, kill
 from tests.monitor_process.model import MODEL, monitor_section
 from tests.monitor_process.test_real_process import Judged
-from tests.waiting import PATIENCE, wait_until
+from tests.waiting import PATIENCE, eventually, wait_until
 
 pytestmark = pytest.mark.long
 
@@ -113,6 +113,15 @@ def test_each_rig_is_judged_as_if_alone_and_one_without_a_router_delays_none(ben
     bench.join_all(range(1))
     bench.send(0, 0, 40)
     bench.turn_until(range(1), 39)
+
+
+def test_one_rig_starts_in_a_turn_as_the_others_wait_for_it(bench):
+    bench.held.set()
+    eventually(lambda: all(seat.has_work(0.0) for seat in bench.seats), "all routers")
+    for count in range(3):
+        assert sum(seat.is_running for seat in bench.seats) == count
+        one_turn(bench.seats, contextlib.nullcontext)
+    assert all(seat.is_running for seat in bench.seats)
 
 
 class Unreadable:

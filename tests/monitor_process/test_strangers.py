@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from monitor.alarms import Occasion
-from monitor.process.cursor import Cursor
+from monitor.process.cursor import Cursor, stored_position
 from rigwatch.wire.bus import KEY as MODEL_KEY
 from rigwatch.wire.bus import ModelReply, ModelRequest, ask_for_model
 from rigwatch.wire.bus.commands.command_check import signed
@@ -154,6 +154,22 @@ def test_a_position_whose_file_is_gone_is_kept_in_a_new_one(
     assert Cursor(path).read() == (7, 11)
     cursor.write(7, 12)
     assert Cursor(path).read() == (7, 12)
+
+
+def test_positions_of_many_rigs_are_written_together_and_one_whose_file_is_emptied_again(
+    tmp_path: Path,
+) -> None:
+    paths = [tmp_path / f"p{number}" for number in range(1200)]
+    cursors = [Cursor(path) for path in paths]
+    os.truncate(paths[7], 0)
+    places = [(cursor, 7, 100 + at) for at, cursor in enumerate(cursors)]
+    Cursor.write_all(places)
+    found = [stored_position(path.read_bytes()) for path in paths]
+    assert found == [None if at == 7 else (7, 100 + at) for at in range(1200)]
+    cursors[7].keep()
+    assert stored_position(paths[7].read_bytes()) == (7, 107)
+    for cursor in cursors:
+        cursor.close()
 
 
 def _refuse(*_: object) -> None:

@@ -47,8 +47,18 @@ from rigwatch.wire.bus.connection import (
 from rigwatch.wire.bus.inbox import Inbox
 from rigwatch.wire.bus.kept_messages import KeptMessages, kept_runs
 from rigwatch.wire.bus.member import unique_process
-from rigwatch.wire.bus.message_ring import LARGEST_NUMBERED, SAID_KEY
+from rigwatch.wire.bus.message_ring import LARGEST_NUMBERED, SAID_KEY, MessageRing
 from rigwatch.wire.bus.ring_questions import RingQuestions
+from rigwatch.wire.bus.several import (
+    Batch,
+    Blocks,
+    EstimateRows,
+    JointReceiver,
+    JointRows,
+    Share,
+    Source,
+    join,
+)
 from rigwatch.wire.bus.subscription import MOST_COMMANDS, QUEUE_CAPACITY, Subscription
 from rigwatch.wire.bus.tokens import sender_named
 from rigwatch.wire.bus.transport import (
@@ -58,6 +68,7 @@ from rigwatch.wire.bus.transport import (
     REFUSED_MARK,
     SILENT_MARK,
     Close,
+    Joining,
 )
 
 __all__ = [
@@ -74,6 +85,8 @@ __all__ = [
     "REFUSED_MARK",
     "SAID_KEY",
     "SILENT_MARK",
+    "Batch",
+    "Blocks",
     "Bus",
     "Close",
     "CommandAnswer",
@@ -81,14 +94,21 @@ __all__ = [
     "CompleteSubscription",
     "DeviceReply",
     "DeviceRequest",
+    "EstimateRows",
     "Inbox",
+    "Joining",
+    "JointReceiver",
+    "JointRows",
     "KeptMessages",
+    "MessageRing",
     "ModelReply",
     "ModelRequest",
     "Place",
     "RingQuestions",
+    "Share",
     "SharedLinks",
     "ShelvedAlarm",
+    "Source",
     "Subscription",
     "TakenAt",
     "Verdict",
@@ -100,6 +120,7 @@ __all__ = [
     "command_alarms",
     "command_mark",
     "connect",
+    "join",
     "joined",
     "kept_runs",
     "log_refusals",

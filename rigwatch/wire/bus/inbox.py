@@ -50,6 +50,17 @@ class Inbox(Generic[T]):
         if self._outside is not None:
             self._outside.take()
         self._items.put(item)
+        if self._outside is not None:
+            self._outside.keep_order()
+
+    @property
+    def outside(self) -> Waiting | None:
+        """Where messages wait before they are accepted; None if they do not."""
+        return self._outside
+
+    def is_read(self) -> bool:
+        """Whether nothing waits here, whatever waits outside."""
+        return self._items.empty()
 
     def may_hold(self) -> bool:
         """Whether something may wait: a look that costs less than the number."""

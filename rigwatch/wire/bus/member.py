@@ -6,13 +6,14 @@ from collections.abc import Callable
 
 from rigwatch.wire.access import CommandSigner
 from rigwatch.wire.bus.kept_messages import KeptMessages
-from rigwatch.wire.bus.message_ring import LARGEST_NUMBERED, RING_BYTES, Outlet
+from rigwatch.wire.bus.message_ring import LARGEST_NUMBERED, RING_BYTES, MessageRing, Outlet
 from rigwatch.wire.bus.tokens import Changed, NamedToken, NamedTokens
 from rigwatch.wire.bus.transport import (
     LEASE,
     MAX_PAYLOAD,
     Answer,
     Close,
+    Joining,
     Receive,
     Transport,
     Waiting,
@@ -86,6 +87,14 @@ class Member:
         if topic.joined:
             return self.transport.listen_among(self.rig, topic.key, receive)
         return self.transport.listen_waiting(self.key(topic.key), receive)
+
+    def joining(self, topic: Topic) -> tuple[Joining, MessageRing] | None:
+        """How a numbered topic is sent among other rigs, for a sender that joins the messages.
+
+        It keeps each in the ring first, which gives it its number. None if each rig sends its own.
+        """
+        found = self.transport.among(self.rig, topic.key) if topic.joined else None
+        return None if found is None else (found, self._numbered().ring_of(topic))
 
     def announce(self, kept: KeptMessages | None = None) -> None:
         """Show subscribers who sends numbered messages here, before the first one.

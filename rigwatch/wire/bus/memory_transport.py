@@ -17,6 +17,7 @@ from rigwatch.wire.bus.transport import (
     MAX_PAYLOAD,
     Answer,
     Close,
+    Joining,
     Receive,
     Waiting,
     answered,
@@ -83,6 +84,10 @@ class MemoryTransport:
     def put_among(self, rig: str, key: str, payload: bytes, mark: bytes = b"") -> None:
         """Send on its own: nothing is gained here by sending it among others."""
         self.put(bus_key(rig, key), payload, mark)
+
+    def among(self, rig: str, key: str) -> Joining | None:  # noqa: ARG002
+        """Nothing is joined here."""
+        return None
 
     def listen_among(self, rig: str, key: str, receive: Receive) -> tuple[Waiting | None, Close]:
         """As `listen_waiting`."""

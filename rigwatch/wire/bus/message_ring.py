@@ -14,7 +14,8 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
+from functools import partial
+from itertools import chain, starmap
 
 import zstandard
 
@@ -54,12 +55,11 @@ class Pack:
     data: bytes | memoryview
 
     @classmethod
-    def of(cls, messages: Sequence[Numbered], room: Slabs) -> "Pack":
-        """Pack some messages into some room."""
-        payloads = [message.payload for message in messages]
+    def of(cls, first: int, payloads: Sequence[bytes], room: Slabs) -> "Pack":
+        """Pack the messages from number `first` on into some room."""
         whole = b"".join(_LENGTH.pack(len(payload)) + payload for payload in payloads)
         packed = room.put(zstandard.compress(whole, PACK_LEVEL))
-        return cls(messages[0].seq, len(payloads), sum(map(len, payloads)), packed)
+        return cls(first, len(payloads), sum(map(len, payloads)), packed)
 
     def copied(self) -> "Pack":
         """The same messages, whatever becomes of the room."""
@@ -84,32 +84,50 @@ class MessageRing:
 
     def __init__(self, run: int, capacity: int = RING_BYTES) -> None:
         self._run, self._capacity = run, capacity
+        # Rings of one process that pack at one moment would delay each other's messages.
+        self._most_kept = 2 * PACKED - run % PACKED
         self._packs: deque[Pack] = deque()
         self._room = Slabs()
-        self._kept: deque[Numbered] = deque()
+        self._kept: deque[bytes] = deque()  # the newest, up to the number before `_next`
         self._bytes = 0
         self._next = 0
         self._lock = threading.Lock()
 
     def add(self, payload: bytes) -> Numbered:
         """Number and store a payload, replacing the oldest if full."""
+        return Numbered(self._run, self.keep(payload), payload)
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """Run, and number of the next message."""
+        return self._run, self._next
+
+    def keep(self, payload: bytes) -> int:
+        """The same for a payload that its sender marks itself: its number."""
         with self._lock:
-            message = Numbered(self._run, self._next, payload)
+            number = self._next
             self._next += 1
-            self._kept.append(message)
+            self._kept.append(payload)
             self._bytes += len(payload)
-            if len(self._kept) >= 2 * PACKED:
+            if len(self._kept) >= self._most_kept:
+                first = self._first_kept
                 older = [self._kept.popleft() for _ in range(PACKED)]
-                self._packs.append(Pack.of(older, self._room))
-            self._forget()
-            return message
+                self._packs.append(Pack.of(first, older, self._room))
+            if self._bytes > self._capacity:
+                self._forget()
+            return number
+
+    @property
+    def _first_kept(self) -> int:
+        """Number of the oldest message that is not packed."""
+        return self._next - len(self._kept)
 
     def _forget(self) -> None:
         while self._packs and self._bytes - self._packs[0].size >= self._capacity:
             self._bytes -= self._packs.popleft().size
             self._room.drop_oldest()
         while not self._packs and self._bytes > self._capacity:
-            self._bytes -= len(self._kept.popleft().payload)
+            self._bytes -= len(self._kept.popleft())
 
     def reply(self, ask: Ask) -> RingReply[Numbered]:
         """The requested messages still stored, as many as fit into one reply."""
@@ -117,8 +135,9 @@ class MessageRing:
             return RingReply(ask.boot, UNKNOWN, ())
         with self._lock:  # for a moment only: it delays publishing
             packs = [pack.messages(self._run) for pack in self._copied(ask.first)]
-            kept, newest = tuple(self._kept), self._next - 1
-        stored = chain(chain.from_iterable(packs), kept)
+            kept, first, newest = tuple(self._kept), self._first_kept, self._next - 1
+        unpacked = starmap(partial(Numbered, self._run), enumerate(kept, first))
+        stored = chain(chain.from_iterable(packs), unpacked)
         later = (message for message in stored if message.seq >= ask.first)
         found = first_fitting(later, ask.last, REPLY_BYTES)
         settled = found[-1].seq if found else min(ask.last, newest)
@@ -185,6 +204,10 @@ class Outlet:
             return [answers.reply(ask).to_bytes()]
 
         self._transport.serve(key, self._counted(answer))
+
+    def ring_of(self, topic: Topic) -> MessageRing:
+        """The ring of a numbered topic: what is kept there and sent otherwise has its number."""
+        return self._rings[topic.name]
 
     def put(self, topic: Topic, payload: bytes) -> None:
         """Store a message, then send it."""

@@ -33,6 +33,31 @@ class Waiting(Protocol):
     def may_hold(self) -> bool:
         """Whether there may be some; where rigs share messages, since the last `collect`."""
 
+    def keep_order(self) -> None:
+        """Something else waits for the reader: no message that comes from now on overtakes it."""
+
+
+class Joining(Protocol):
+    """Sends a topic of a rig among the messages of other rigs, or what has been joined already."""
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether anybody listens at the rig's own key."""
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether a process of several rigs listens."""
+
+    @property
+    def together_with(self) -> object:
+        """Messages of those for which it is the same may be joined."""
+
+    def put_own(self, payload: bytes, mark: bytes) -> None:
+        """Send at the rig's own key alone."""
+
+    def add_joined(self, message: bytes) -> None:
+        """Send a joined message."""
+
 
 class Transport(Protocol):
     """Carries bytes between processes. Keys are complete, such as "rig/bench1/daq/samples"."""
@@ -61,6 +86,9 @@ class Transport(Protocol):
 
         Who listens at the whole key gets it as with `put`.
         """
+
+    def among(self, rig: str, key: str) -> Joining | None:
+        """What `put_among` sends with, if it joins messages of rigs that share the link."""
 
     def listen_among(self, rig: str, key: str, receive: Receive) -> tuple[Waiting | None, Close]:
         """As `listen_waiting` at a rig's `key`, for what is sent with `put_among`."""

@@ -277,6 +277,9 @@ class _WaitingChannel(_Channel):
         """Only a look into it tells."""
         return True
 
+    def keep_order(self) -> None:
+        """Nothing overtakes what waits here."""
+
 
 class ZenohTransport:
     """What one process does on one bus, over a Zenoh session.
@@ -343,7 +346,7 @@ class ZenohTransport:
 
     def collect(self) -> None:
         """Hand to transports over the same session what has come in joined messages."""
-        self._common.distribute()
+        self._common.collect()
 
     @property
     def identity(self) -> str:
@@ -365,6 +368,13 @@ class ZenohTransport:
             return
         outlet = self._outlets.get((rig, key)) or self._outlet(rig, key)
         outlet.put(payload, mark)
+
+    def among(self, rig: str, key: str) -> Among | None:
+        """What sends a rig's topic among those of other rigs; None if each is sent by itself."""
+        if self._joint is None or not self._keyless:
+            return None
+        outlet = self._outlets.get((rig, key)) or self._outlet(rig, key)
+        return outlet if isinstance(outlet, Among) else None
 
     def _line(self, key: str) -> _Line:
         with self._lock:

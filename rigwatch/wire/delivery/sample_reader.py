@@ -10,10 +10,20 @@ All logic is in `sample_order.py`; a block in order passes straight through, in 
 import contextlib
 import time
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import groupby
 
-from rigwatch.wire.bus import MAX_PAYLOAD, QUEUE_CAPACITY, Bus, Inbox, RingQuestions, sender_named
+from rigwatch.wire.bus import (
+    MAX_PAYLOAD,
+    QUEUE_CAPACITY,
+    Bus,
+    Inbox,
+    JointReceiver,
+    RingQuestions,
+    Share,
+    Source,
+    sender_named,
+)
 from rigwatch.wire.delivery.ring import SOURCE_KEY
 from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import (
@@ -22,6 +32,7 @@ from rigwatch.wire.messages import (
     RING_KEY,
     SAMPLES,
     Event,
+    Form,
     Gap,
     SampleBlock,
     concatenate,
@@ -131,6 +142,12 @@ class SampleReader:
         return self._inbox.may_hold()
 
     @property
+    def joint(self) -> JointReceiver | None:
+        """What receives the samples of this rig among those of others; None if nothing does."""
+        share = self._inbox.outside
+        return share.of if isinstance(share, Share) else None
+
+    @property
     def counters(self) -> Counters:
         """Counts of delivered, recovered and lost samples so far."""
         return self._order.counters
@@ -159,6 +176,58 @@ class SampleReader:
         if not owner and in_control is not None:
             owner = self._owners.owner_of(in_control)
         return owner == sender
+
+    def open_row(self, suits: Callable[[Form], bool]) -> tuple[int, int] | None:
+        """Leave samples that simply follow to the row of this rig, if it can have one.
+
+        That is until `Share.keep_order` is called, by whatever else comes. What the row has taken
+        is told by `went_on`, before anything is read here again.
+
+        Args:
+            suits: whether blocks of a form of their device and boot can be taken there; asked once.
+
+        Returns:
+            (boot, seq) of the last sample that was read; None if the row remains closed.
+        """
+        share, position = self._inbox.outside, self._order.goes_on_after
+        if not isinstance(share, Share) or position is None or self._ready:
+            return None
+        boot, device = position[0], self._device
+        sender = self._owners.owner_of(boot)
+        doubted = self._refused is not None and self._refused[0] == boot
+        if not self.heard or doubted or not sender or not self._owners.admits(boot, sender):
+            return None
+        source = Source(sender, device, boot, suits)
+        opened = share.of.open(share, source, position[1] + 1, self._inbox.is_read)
+        return position if opened else None
+
+    @property
+    def device(self) -> str:
+        """The device of the last sample that was read."""
+        return self._device
+
+    @property
+    def has_some_alone(self) -> bool:
+        """Whether something waits, or has come apart from the joined messages."""
+        return self._inbox.may_hold()
+
+    def close_row(self) -> None:
+        """Read all that comes here again."""
+        if isinstance(self._inbox.outside, Share):
+            self._inbox.outside.keep_order()
+
+    def went_on(self, count: int, heard_at: float, t_ns: int) -> None:
+        """The row has taken samples since it was opened.
+
+        Args:
+            count: of them; nothing is told of none.
+            heard_at: monotonic time of the last ones [s].
+            t_ns: Unix time of the last one [ns].
+        """
+        self._order.went_on(count, t_ns)
+        self._latest_ns = t_ns
+        self._heard_at = self._silence_told_at = heard_at
+        self._unsure.end()
 
     def silent_for(self) -> float:
         """Time since the last sample, or since the start [s]."""

@@ -23,7 +23,7 @@ from rigwatch.wire.messages.blocks import (
 )
 from rigwatch.wire.messages.codec import decode, decode_all, encode
 from rigwatch.wire.messages.json_fields import json_fields
-from rigwatch.wire.messages.layout import Layout
+from rigwatch.wire.messages.layout import Layout, Names
 from rigwatch.wire.messages.message_types import (
     EVERY_ALARM,
     LONGEST_NAME,
@@ -70,6 +70,9 @@ from rigwatch.wire.messages.quality_flags import (
     STALE,
     valid,
 )
+from rigwatch.wire.messages.rows import MOST_COLUMNS as MOST_ROW_COLUMNS
+from rigwatch.wire.messages.rows import MOST_SAMPLES as MOST_ROW_SAMPLES
+from rigwatch.wire.messages.rows import Form
 from rigwatch.wire.messages.topics import (
     ALARMS,
     ALIVE_KEY,
@@ -107,6 +110,8 @@ __all__ = [
     "MONITOR_STALE",
     "MOST_ALARMS",
     "MOST_FIGURES",
+    "MOST_ROW_COLUMNS",
+    "MOST_ROW_SAMPLES",
     "MOST_SOURCES",
     "NON_FINITE",
     "NOT_PROVED",
@@ -136,12 +141,14 @@ __all__ = [
     "ColumnTable",
     "EstimateBlock",
     "Event",
+    "Form",
     "Gap",
     "Health",
     "Identity",
     "Layout",
     "Message",
     "ModelChange",
+    "Names",
     "Numbers",
     "RunInfo",
     "SampleBlock",

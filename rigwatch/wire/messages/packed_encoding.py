@@ -56,6 +56,27 @@ def encode_block(block: Block) -> bytes:
     return b"".join(parts)
 
 
+def source_bytes(kind: type[Block], device: str, boot: int) -> bytes:
+    """What all blocks of a boot begin with."""
+    return _source(kind is SampleBlock, device).head(boot)
+
+
+def estimate_heads(names: Names, size: int) -> tuple[bytes, tuple[bytes, ...]]:
+    """What precedes the times, and each column's values, of estimates without quality.
+
+    Args:
+        names: of the columns.
+        size: of the times, and of each column's values [bytes].
+    """
+    *_, times, columns = estimate_tags()
+    return _head(times, size), _heads(columns, names, size)
+
+
+def estimate_tags() -> tuple[bytes, ...]:
+    """What marks device, boot, number, times and each column of a block of estimates."""
+    return _TAGS[EstimateBlock]
+
+
 class _Source:
     """The bytes that all blocks of a boot begin with, of a device's newest boot: a year has
     hundreds.

@@ -100,10 +100,31 @@ class SampleOrder(Generic[S]):
             return False
         if not self.sources.goes_on(block):
             return False
+        self._pass(front, count)
+        return True
+
+    def _pass(self, front: Stream[S], count: int) -> None:
         self._heard_since_ask, self._stale = True, 0
         front.next += count
         self.counters.delivered += count
-        return True
+
+    @property
+    def goes_on_after(self) -> tuple[int, int] | None:
+        """(boot, seq) of the last sample if one that follows is delivered at once, else None."""
+        front = self._line[0] if self._line else None
+        if front is None or front.waiting or front.ended or front.next > LARGEST_SEQ // 2:
+            return None
+        return self.position if self.sources.is_unrivalled(front.boot) else None
+
+    def went_on(self, count: int, t_ns: int) -> None:
+        """So many samples that follow have been delivered, where `goes_on_after` says so.
+
+        Args:
+            count: of them.
+            t_ns: time of the last one [ns].
+        """
+        self.sources.went_on(t_ns)
+        self._pass(self._line[0], count)
 
     def on_reply(self, ask: Ask, reply: RingReply[S] | None) -> list[Outcome[S]]:
         """Process the ring's reply to `ask`; None if there was none."""

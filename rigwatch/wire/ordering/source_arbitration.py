@@ -176,14 +176,22 @@ class Sources:
 
     def goes_on(self, block: SampleBlock | Numbered) -> bool:
         """Whether the source in control speaks while no other does, which changes nothing."""
-        if block.boot != self.current or self._rivals:
+        if not self.is_unrivalled(block.boot):
             return False
         self._hear(block)
         return True
 
-    def _hear(self, block: SampleBlock | Numbered) -> None:
+    def is_unrivalled(self, boot: int) -> bool:
+        """Whether a source has control and no other speaks."""
+        return boot == self.current and not self._rivals
+
+    def went_on(self, t_ns: int) -> None:
+        """The source in control has spoken, at last at `t_ns`, and no other has."""
         self._silent = False
-        self._latest_ns = int(block.t_ns[-1])  # the clock may have been set back
+        self._latest_ns = t_ns  # the clock may have been set back
+
+    def _hear(self, block: SampleBlock | Numbered) -> None:
+        self.went_on(int(block.t_ns[-1]))
 
     def _current_spoke(self, block: SampleBlock | Numbered) -> Verdict:
         self._hear(block)

@@ -8,10 +8,38 @@
 A message costs sender, router and receiver far more than its bytes. So a process of several rigs
 sends those of a moment as one, which only processes of several rigs receive. Whoever follows one
 rig listens at the rig's own key, where such a process sends as long as somebody is there.
+
+Blocks of samples that simply follow are taken out of a joined message for all rigs at once
+(`joint_rows`), and their estimates written into one (`joint_writing`).
 """
 
 from rigwatch.wire.bus.several.joint_link import JointLink
-from rigwatch.wire.bus.several.joint_receiver import WAITING, Following, Received
+from rigwatch.wire.bus.several.joint_message import join
+from rigwatch.wire.bus.several.joint_receiver import (
+    WAITING,
+    Following,
+    JointReceiver,
+    Received,
+    Share,
+)
+from rigwatch.wire.bus.several.joint_rows import Batch, JointRows, Source
 from rigwatch.wire.bus.several.joint_sender import Alone, Among, alone_key
+from rigwatch.wire.bus.several.joint_writing import Blocks, EstimateRows
 
-__all__ = ["WAITING", "Alone", "Among", "Following", "JointLink", "Received", "alone_key"]
+__all__ = [
+    "WAITING",
+    "Alone",
+    "Among",
+    "Batch",
+    "Blocks",
+    "EstimateRows",
+    "Following",
+    "JointLink",
+    "JointReceiver",
+    "JointRows",
+    "Received",
+    "Share",
+    "Source",
+    "alone_key",
+    "join",
+]

@@ -36,10 +36,10 @@ class JointLink:
                 self._senders[key] = JointSender(self._line(joint_key(key)), self.burst)
             return self._senders[key]
 
-    def distribute(self) -> None:
-        """Hand out what has come of all topics."""
+    def collect(self) -> None:
+        """Hand out what has come of all topics, but for what rows take."""
         for receiver in tuple(self._receivers.values()):
-            receiver.distribute()
+            receiver.collect()
 
     def receiver(self, key: str) -> JointReceiver:
         """Receives a topic."""

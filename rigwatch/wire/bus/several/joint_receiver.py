@@ -10,6 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from rigwatch.wire.bus.several.joint_message import split
+from rigwatch.wire.bus.several.joint_rows import JointRows, Source
 from rigwatch.wire.bus.transport import Receive
 from rigwatch.wire.errors import MessageError
 
@@ -33,25 +34,29 @@ class JointReceiver:
 
     Attributes:
         strange: what has come and is no joined message.
+        rows: takes what simply follows where it is collected; None for nothing.
     """
 
     def __init__(self, following: Following) -> None:
         self.strange: deque[Received] = deque(maxlen=WAITING)
+        self.rows: JointRows | None = None
         self._following = following
-        self._rigs: dict[str, tuple[deque[Received], ...]] = {}
+        self._rigs: dict[str, tuple[Share, ...]] = {}
         self._lock = threading.Lock()
 
     def add(self, rig: str, receive: Receive, alone: Following) -> "Share":
         """What comes from now on of a rig, for one more reader; `alone`: what is not joined."""
         share = Share(self, rig, receive, alone)
         with self._lock:
-            self._rigs[rig] = (*self._rigs.get(rig, ()), share.waiting)
+            self._close(rig)
+            self._rigs[rig] = (*self._rigs.get(rig, ()), share)
         return share
 
     def remove(self, share: "Share") -> None:
         """Keep no more for a reader."""
         with self._lock:
-            left = tuple(one for one in self._rigs.get(share.rig, ()) if one is not share.waiting)
+            self._close(share.rig)
+            left = tuple(one for one in self._rigs.get(share.rig, ()) if one is not share)
             self._rigs[share.rig] = left
             if not left:
                 del self._rigs[share.rig]
@@ -59,16 +64,59 @@ class JointReceiver:
     def distribute(self) -> None:
         """Hand out what has come."""
         with self._lock:
-            while (found := self._following()) is not None:
-                data, sender, _ = found
-                try:
-                    parts = split(data)
-                except MessageError:
-                    self.strange.append(found)
-                    continue
-                for rig, mark, payload in parts:
-                    for waiting in self._rigs.get(rig, ()):
-                        waiting.append((payload, sender, mark))
+            self._distribute(None)
+
+    def collect(self) -> None:
+        """The same, but for what the rows take."""
+        with self._lock:
+            self._distribute(self.rows)
+
+    def name(self, row: int, rig: str) -> bool:
+        """Give a row to a rig; False if there are none, or it can have none."""
+        with self._lock:
+            return self.rows is not None and self.rows.name(row, rig)
+
+    def open(
+        self, share: "Share", source: Source, following: int, is_read: Callable[[], bool]
+    ) -> bool:
+        """Open the row of a rig whose only reader this is, if its messages come joined and none
+        waits.
+
+        Args:
+            share: of the reader.
+            source: whose samples the row takes.
+            following: number of the next one.
+            is_read: whether the reader has taken all that was passed on to it.
+        """
+        with self._lock:
+            alone = len(self._rigs.get(share.rig, ())) == 1
+            ready = share.comes_joined and not share.waiting and is_read()
+            if self.rows is None or not alone or not ready:
+                return False
+            return self.rows.open(share.rig, source, following)
+
+    def close(self, rig: str) -> None:
+        """Close the row of a rig: all that comes is handed out."""
+        with self._lock:
+            self._close(rig)
+
+    def _close(self, rig: str) -> None:
+        if self.rows is not None:
+            self.rows.close(rig)
+
+    def _distribute(self, rows: JointRows | None) -> None:
+        while (found := self._following()) is not None:
+            data, sender, _ = found
+            try:
+                parts = split(data) if rows is None else rows.take(data, sender)
+            except MessageError:
+                self.strange.append(found)
+                continue
+            for rig, mark, payload in parts:
+                self._close(rig)
+                for share in self._rigs.get(rig, ()):
+                    share.comes_joined = True
+                    share.waiting.append((payload, sender, mark))
 
 
 class Share:
@@ -79,12 +127,16 @@ class Share:
         rig: the rig's id.
         receive: the reader.
         alone: gives the messages that came alone.
+
+    Attributes:
+        comes_joined: whether the last message that was found had been joined.
     """
 
     def __init__(self, of: JointReceiver, rig: str, receive: Receive, alone: Following) -> None:
-        self.rig = rig
+        self.rig, self.of = rig, of
+        self.comes_joined = False
         self.waiting: deque[Received] = deque(maxlen=WAITING)
-        self._of, self._receive, self._alone = of, receive, alone
+        self._receive, self._alone = receive, alone
         self._passed = self._pause = 0
         self._lock = threading.Lock()
 
@@ -104,20 +156,26 @@ class Share:
                 break
             self.waiting.append(found)
         some = len(self.waiting) > before
+        self.comes_joined = self.comes_joined and not some
         self._passed, self._pause = 0, 0 if some else min(self._pause + 1, MOST_PASSED)
 
     def take(self) -> None:
         """Pass on what has come, in order."""
         with self._lock:
-            self._of.distribute()
+            self.keep_order()
+            self.of.distribute()
             self._look()
             while self.waiting:
                 self._receive(*self.waiting.popleft())
             with suppress(IndexError):  # another rig's reader has been quicker
-                while self._of.strange:
+                while self.of.strange:
                     # It counts as rejected where it is found.
-                    self._receive(*self._of.strange.popleft())
+                    self._receive(*self.of.strange.popleft())
+
+    def keep_order(self) -> None:
+        """Something waits for the reader elsewhere: nothing may overtake it in a row."""
+        self.of.close(self.rig)
 
     def undeclare(self) -> None:
         """Get nothing more."""
-        self._of.remove(self)
+        self.of.remove(self)

@@ -63,6 +63,12 @@ class JointSender:
         if first and not full:
             self._burst.add(self.send)
 
+    def add_joined(self, message: bytes) -> None:
+        """Send with the next burst what has been joined already, of at most `LARGEST` bytes."""
+        with self._lock:
+            self._send()  # what came before
+        self._burst.add(lambda: self._line.put(message, b""))
+
     def send(self) -> None:
         """Send what waits."""
         with self._lock:
@@ -96,10 +102,33 @@ class Among:
         self._rig, self._own, self._alone = rig, own, alone
         self._joint, self._burst = joint, burst
 
+    @property
+    def is_followed(self) -> bool:
+        """Whether anybody listens at the rig's own key."""
+        return self._own.is_heard
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether a process of several rigs listens."""
+        return self._joint.is_heard
+
+    @property
+    def together_with(self) -> object:
+        """Messages of those for which it is the same may be joined."""
+        return self._joint
+
+    def add_joined(self, message: bytes) -> None:
+        """Send a joined message, with the next burst."""
+        self._joint.add_joined(message)
+
+    def put_own(self, payload: bytes, mark: bytes) -> None:
+        """Send at the rig's own key alone, with the next burst."""
+        self._burst.add(lambda: self._own.put(payload, mark))
+
     def put(self, payload: bytes, mark: bytes) -> None:
         """Send with the next burst."""
-        if self._own.is_heard:
-            self._burst.add(lambda: self._own.put(payload, mark))
+        if self.is_followed:
+            self.put_own(payload, mark)
         part = self._rig, mark, payload
         if size_of(part) > LARGEST:
             self._burst.add(lambda: self._alone.put(payload, mark))
