@@ -12,6 +12,7 @@ from pathlib import Path
 
 from daq.__main__ import acquire
 from daq.adapters import adapter_for
+from daq.together import Lane
 from daq.turns import Turns
 from rigwatch.wire.bus import SharedLinks, joined
 from rigwatch.wire.host import (
@@ -64,7 +65,7 @@ def run_several(paths: list[Path]) -> int:
     raise_priority(DAQ)
     prepare_for_real_time()
     links = SharedLinks(len(paths))
-    turns = Turns(TURN, links.together)
+    turns = Turns(TURN, links.together, before=Lane().take)
     parts = [Part(str(path), work_of(path, links, turns), partial(used, path)) for path in paths]
     run_side_by_side(parts, Heartbeat("daq"), stop, set_at_hangup())
     links.close()

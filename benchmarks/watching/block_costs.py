@@ -19,8 +19,9 @@ import numpy as np
 from benchmarks.archives.recordings import MODEL, RATE
 from benchmarks.processes.many_devices import encoded
 from benchmarks.processes.many_rigs_chain import rig_files
-from daq.__main__ import Chain
 from daq.adapters.serial_line import SerialAdapter
+from daq.chain import Chain
+from daq.together import Lane
 from monitor.model import load_model
 from monitor.pipeline import compile_together
 from monitor.process.several import Seat, one_turn
@@ -55,7 +56,7 @@ def measured(paths: list[Path], cycles: int) -> tuple[float, float]:
     """Processor time of a block in daq and in the monitor [µs]."""
     network = MemoryNetwork()
     compile_together(load_model(MODEL))
-    lines = [Line() for _ in paths]
+    lane, lines = Lane(), [Line() for _ in paths]
     chains = [_chain(path, line, network) for path, line in zip(paths, lines, strict=True)]
     seats = [
         Seat(path, print, lambda config, process: network.bus(config.rig.id, process))
@@ -69,7 +70,7 @@ def measured(paths: list[Path], cycles: int) -> tuple[float, float]:
             line.put(data)
         # In real time: the clocks of device and host are compared.
         time.sleep(max(0.0, began + number * BLOCK / RATE - time.monotonic()))
-        spent[0].append(_processor_time(lambda: _step(chains)))
+        spent[0].append(_processor_time(lambda: _step(lane, chains)))
         spent[1].append(_processor_time(lambda: one_turn(seats, contextlib.nullcontext)))
     assert all(seat.delivered >= cycles * BLOCK for seat in seats), "samples did not arrive"
     for seat in seats:
@@ -108,7 +109,8 @@ def _chain(path: Path, line: Line, network: MemoryNetwork) -> Chain:
     return chain
 
 
-def _step(chains: list[Chain]) -> None:
+def _step(lane: Lane, chains: list[Chain]) -> None:
+    lane.take(chains)
     for chain in chains:
         chain.step(0.0)
 

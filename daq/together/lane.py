@@ -1,0 +1,166 @@
+"""Takes the blocks of many rigs together; which ones, is decided here.
+
+A rig's block is taken with those of others if
+
+    the rig is on a serial line that is open and in order, and a block of its boot is in its ring;
+    whole frames have come, all intact and of that boot, whose samples are the next ones.
+
+Otherwise nothing of it is taken, and the rig's own chain reads it from the adapter, which keeps it.
+"""
+
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import accumulate
+
+import numpy as np
+
+from daq.adapters.frame_run import most_frames
+from daq.chain import Chain
+from daq.clock import DeviceClock
+from daq.conditioning import Conditioner
+from daq.sequence import SequenceTracker
+from daq.together.message_text import Text
+from daq.together.seat import RigState, Seat, seat_of
+from daq.together.tables import Blocks, blocks_for, keep_and_write, number_and_stamp
+from rigwatch.wire.delivery import RingArrays
+
+
+@dataclass(frozen=True, slots=True)
+class _Reading:
+    """What a rig's line has brought: whole frames, and when the last byte arrived [ns]."""
+
+    seat: Seat
+    frames: bytes
+    arrived_ns: int
+
+
+class Lane:
+    """The tables of a process."""
+
+    def __init__(self) -> None:
+        _compile()
+
+    def take(self, chains: Sequence[Chain]) -> None:
+        """Read the rigs' lines, and publish what can be taken together.
+
+        Each rig's next `step` reads and publishes the rest.
+        """
+        groups: dict[tuple[str, int], list[_Reading]] = {}
+        for chain in chains:
+            if (reading := _reading(chain)) is not None:
+                groups.setdefault(reading.seat.alike, []).append(reading)
+        for alike in groups.values():
+            _take(alike)
+
+
+def _reading(chain: Chain) -> _Reading | None:
+    """Read the line of a rig whose block may be taken."""
+    seat = chain.seat
+    if not (isinstance(seat, Seat) and seat.lasts):
+        chain.seat = seat = seat_of(chain)
+    if seat is None or not chain.device.connected or chain.device.text:
+        return None
+    found = chain.device.attempt(seat.adapter.receive)
+    return None if found is None else _Reading(seat, *found)
+
+
+def _take(alike: Sequence[_Reading]) -> None:
+    """Publish the blocks of rigs with as many channels that simply follow."""
+    seats = [reading.seat for reading in alike]
+    sizes = [len(reading.frames) for reading in alike]
+    channels = seats[0].adapter.channels
+    blocks = blocks_for(len(seats), most_frames(max(sizes), channels), channels)
+    like, rigs = seats[0].state.state, np.array([seat.state.address for seat in seats])
+    number_and_stamp(
+        like,
+        rigs,
+        np.frombuffer(b"".join([reading.frames for reading in alike]), np.uint8),
+        np.array([0, *accumulate(sizes)]),
+        np.array([reading.arrived_ns for reading in alike]),
+        np.array([seat.longest for seat in seats]),
+        blocks,
+    )
+    counts: list[int] = blocks.size.tolist()
+    taken = [row for row, count in enumerate(counts) if count]
+    if not taken:
+        return
+    _stamp_rest(seats, taken, blocks)
+    firsts = blocks.samples[:, 0, 0].tolist()
+    texts = [seats[row].text(firsts[row], counts[row]) for row in taken]
+    starts = [0, *accumulate([text.size for text in texts])]
+    to = np.empty(starts[-1], np.uint8)
+    with _all_held([seats[row].chain.publisher.ring.lock for row in taken]):
+        keep_and_write(
+            like,
+            rigs,
+            texts[0].state.state,
+            np.array([text.state.address for text in texts]),
+            np.array(taken),
+            np.array(starts),
+            blocks,
+            to,
+        )
+        for row in taken:
+            seats[row].store.newest = firsts[row] + counts[row] - 1
+    written = to.tobytes()
+    for row, begin, end in zip(taken, starts[:-1], starts[1:], strict=True):
+        _publish(alike[row], blocks, row, written[begin:end])
+
+
+def _stamp_rest(seats: Sequence[Seat], taken: Sequence[int], blocks: Blocks) -> None:
+    """Stamp what lies along no line: as each quarter second begins, and after a jump."""
+    for row in np.array(taken)[(blocks.stamped < blocks.size)[taken]].tolist():
+        of, count = seats[row].chain.acquisition, int(blocks.size[row])
+        samples = blocks.samples[row, :, :count]
+        at, stamps = int(blocks.stamped[row]), blocks.stamps[row, :count]
+        if jump := of.clock.stamp_rest(samples, at, stamps):
+            remark = of.clock_jumped(jump, int(samples[2, 0]))
+            seats[row].chain.publisher.publish([remark])
+
+
+def _publish(reading: _Reading, blocks: Blocks, row: int, payload: bytes) -> None:
+    """Publish a block whose samples are in the ring."""
+    seat, count = reading.seat, int(blocks.size[row])
+    of = seat.chain.acquisition
+    last_ns = int(blocks.stamps[row, count - 1]) - of.clock.unix_ns(0)
+    of.samples += count
+    of.watch.saw_run(seat.store.boot, seat.store.newest, count, last_ns, reading.arrived_ns)
+    if blocks.flagged[row]:
+        for name, flags in zip(seat.channels, blocks.flags[row, :count].T, strict=True):
+            of.watch.count_flags(name, flags)
+    seat.adapter.took(count)
+    seat.chain.publisher.publish_kept(payload)
+    seat.chain.taken = True
+
+
+@contextmanager
+def _all_held(locks: Sequence[threading.Lock]) -> Iterator[None]:
+    """While all are held; others hold one at a time."""
+    for lock in locks:
+        lock.acquire()
+    try:
+        yield
+    finally:
+        for lock in locks:
+            lock.release()
+
+
+def _compile() -> None:
+    """Compile before the first sample arrives."""
+    nothing, bytes_ = np.zeros(0, np.int64), np.zeros(0, np.uint8)
+    clock, times = DeviceClock(1.0), np.zeros(1, np.int64)
+    rows = np.zeros((1, 1)), np.zeros((1, 1), np.uint8)
+    like = RigState(
+        SequenceTracker(1.0).count,
+        clock.place,
+        clock.line,
+        Conditioner(()).states,
+        RingArrays(times, times, times, *rows),
+    )
+    blocks, starts = blocks_for(1, 1, 1), np.zeros(1, np.int64)
+    data = np.frombuffer(b"", np.uint8)
+    number_and_stamp(like, nothing, data, starts, nothing, nothing, blocks)
+    text = Text(bytes_, nothing)
+    keep_and_write(like, nothing, text, nothing, nothing, starts, blocks, bytes_)
