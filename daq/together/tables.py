@@ -13,9 +13,9 @@ from daq.clock import stamp_along
 from daq.conditioning import calibrate
 from daq.sequence import SEQ, take_next
 from daq.together.message_text import Text, write_text
+from daq.together.ring_rows import put_run
 from daq.together.seat import RigState
 from rigwatch.wire.arrays import BoolArray, IntArray
-from rigwatch.wire.delivery import put_run
 from rigwatch.wire.device import VERSION
 from rigwatch.wire.kept_state import kept
 from rigwatch.wire.kernel import kernel, part

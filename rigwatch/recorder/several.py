@@ -48,7 +48,10 @@ def run_several(paths: list[Path], stop: threading.Event, notes: str = "") -> li
     Raises:
         ConfigError: no configuration is valid, or two are of one rig.
     """
+    from rigwatch.wire.quick_joining import join_quickly  # not for the recorder of one rig
+
     use_few_pools()
+    join_quickly()
     folders: dict[Path, Path] = {}
     valid_rigs(paths)  # a wrong file is named by its rig's thread
     keep_memory_tidy(stop)

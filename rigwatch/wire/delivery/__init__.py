@@ -11,7 +11,6 @@ from rigwatch.wire.delivery.ring import (
     RingArrays,
     RingStore,
     SampleRing,
-    put_run,
 )
 from rigwatch.wire.delivery.sample_reader import Item, SampleReader
 from rigwatch.wire.ordering import LARGEST_SEQ, POSITION_WRONG, Counters
@@ -26,5 +25,4 @@ __all__ = [
     "RingStore",
     "SampleReader",
     "SampleRing",
-    "put_run",
 ]

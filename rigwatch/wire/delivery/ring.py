@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.bus import MAX_PAYLOAD, Bus
-from rigwatch.wire.kernel import kernel
 from rigwatch.wire.messages import RING_KEY, BlockSize, ByteArray, Column, SampleBlock
 from rigwatch.wire.ordering import UNKNOWN, Ask, RingReply
 
@@ -37,30 +36,6 @@ class RingArrays(NamedTuple):
     quality: ByteArray
 
 
-@kernel()
-def put_run(  # noqa: PLR0917 -- a compiled kernel takes no keywords
-    ring: RingArrays,
-    first: int,
-    device_us: IntArray,
-    t_ns: IntArray,
-    values: FloatArray,
-    quality: ByteArray,
-) -> None:
-    """Store consecutive samples as `RingStore.add` does, no more than it has room for.
-
-    Args:
-        ring: filled.
-        first: number of the first one.
-        device_us, t_ns: shape (n,).
-        values, quality: shape (n, channels).
-    """
-    for k in range(t_ns.size):
-        row = (first + k) % ring.seq.size
-        ring.seq[row], ring.device_us[row], ring.t_ns[row] = first + k, device_us[k], t_ns[k]
-        for c in range(values.shape[1]):
-            ring.values[c, row], ring.quality[c, row] = values[k, c], quality[k, c]
-
-
 class RingStore:
     """The last samples of one boot.
 
@@ -70,7 +45,7 @@ class RingStore:
 
     Attributes:
         newest: number of the newest sample.
-        arrays: the samples, for `put_run`, whose caller counts up `newest`.
+        arrays: the samples, for a compiled call that adds many, whose caller counts up `newest`.
     """
 
     def __init__(self, head: SampleBlock, capacity: int) -> None:

@@ -6,6 +6,7 @@ To the ordering logic a run is a boot and a message a block of one sample.
 """
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -63,3 +64,29 @@ class Numbered:
             MessageError: there are too few bytes.
         """
         return cls.marked(data[: _PLACE.size], data[_PLACE.size :])
+
+
+@dataclass(frozen=True, slots=True)
+class NumberedRun:
+    """Messages of a run that follow one another, the first of them numbered `seq`."""
+
+    boot: int
+    seq: int
+    payloads: Sequence[bytes]
+    t_ns: ClassVar[tuple[int]] = Numbered.t_ns
+
+    def __len__(self) -> int:
+        return len(self.payloads)
+
+    @classmethod
+    def marked(cls, marks: Sequence[bytes], payloads: Sequence[bytes]) -> "NumberedRun | None":
+        """The messages received with these marks; None unless each follows the one before."""
+        whole = b"".join(marks)
+        if len(whole) != len(marks) * _PLACE.size:
+            return None
+        found = struct.unpack(f"<{2 * len(marks)}q", whole)
+        run, first = found[:2]
+        follows = (run, *range(first, first + len(marks)))
+        if found[2::2] != (run,) * (len(marks) - 1) or found[1::2] != follows[1:]:
+            return None
+        return cls(run, first, payloads)
