@@ -72,8 +72,7 @@ class Conditioner:
         device: the device's name in messages.
 
     Attributes:
-        boot: whose samples came last.
-        states: of that boot, for `calibrate`.
+        states: of the boot whose samples came last, for `calibrate`.
     """
 
     def __init__(self, channels: Sequence[ChannelSection], device: str = "rig") -> None:
@@ -83,7 +82,7 @@ class Conditioner:
         self._stuck_after = np.array([channel.stuck_after for channel in channels], np.int64)
         steps = [np.inf if c.spike_above is None else c.spike_above for c in channels]
         self._limits = np.stack([c.code_low, c.code_high, c.low, c.high, steps])
-        self.boot: int | None = None
+        self._boot: int | None = None
         self._state = np.zeros(len(self._channels), _STATE)
         self.states = States(
             self._calibration.gain,
@@ -101,8 +100,8 @@ class Conditioner:
             raw: n samples.
             t_ns: shape (n,), Unix time of each [ns].
         """
-        if raw.boot != self.boot:
-            self.boot = raw.boot
+        if raw.boot != self._boot:
+            self._boot = raw.boot
             self._state[:] = np.zeros(1, _STATE)
             self._state["since_move"] = np.iinfo(np.int64).max // 2
         # A copy for all channels, as one for each costs more.

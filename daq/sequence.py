@@ -48,8 +48,8 @@ class Restart:
 
 
 Step = RawBlock | Hole | Restart
-_DEVICE_BOOT, _BOOT, SEQ, _US, _ARRIVED, _REPEATS_SO_FAR = range(6)
-"""Places of a tracker's numbers in its `count`; at `SEQ` that of the last sample."""
+_DEVICE_BOOT, BOOT, SEQ, _US, _ARRIVED, _REPEATS_SO_FAR = range(6)
+"""Places of a tracker's numbers in its `count`: of the samples `BOOT`, of the last one `SEQ`."""
 _REPEATED: list[Step] = []
 """Marks a sample as a repeat; compared by identity, distinct from "nothing to report"."""
 
@@ -68,7 +68,7 @@ class SequenceTracker:
 
     _device_boot = Shared[int]("_count", _DEVICE_BOOT)
     """-1 for none."""
-    boot = Shared[int]("_count", _BOOT)
+    boot = Shared[int]("_count", BOOT)
     """That of the samples delivered."""
     _seq = Shared[int]("_count", SEQ)
     _us = Shared[int]("_count", _US)

@@ -52,6 +52,7 @@ class SerialPort:
         self.port = port
         self.baud = baud
         self._serial: serial.Serial | None = None
+        self._fd = -1
 
     def open(self) -> None:
         """Open the first match of the pattern.
@@ -64,6 +65,7 @@ class SerialPort:
         self._serial = first_that_opens(
             self.port, lambda path: serial.Serial(path, self.baud, timeout=0, exclusive=True)
         )
+        self._fd = self._serial.fileno()
 
     def read(self, timeout: float) -> bytes:
         """The bytes available within `timeout` [s].
@@ -74,7 +76,7 @@ class SerialPort:
         if self._serial is None:
             raise DeviceError(f"{self.port} is not open")
         try:
-            fd = self._serial.fileno()
+            fd = self._fd
             data = os.read(fd, _CHUNK) if timeout <= 0.0 else None
             if not data:  # which does not tell whether the line was closed
                 data = os.read(fd, _CHUNK) if ready_to_read((fd,), timeout) else None

@@ -21,7 +21,7 @@ from daq.chain import Chain
 from daq.clock import DeviceClock
 from daq.conditioning import Conditioner
 from daq.sequence import SequenceTracker
-from daq.together.message_text import Text
+from daq.together.message_text import MessageTexts, Text
 from daq.together.seat import RigState, Seat, seat_of
 from daq.together.tables import Blocks, blocks_for, keep_and_write, number_and_stamp
 from rigwatch.wire.delivery import RingArrays
@@ -40,6 +40,7 @@ class Lane:
     """The tables of a process."""
 
     def __init__(self) -> None:
+        self._texts = MessageTexts()
         _compile()
 
     def take(self, chains: Sequence[Chain]) -> None:
@@ -52,7 +53,7 @@ class Lane:
             if (reading := _reading(chain)) is not None:
                 groups.setdefault(reading.seat.alike, []).append(reading)
         for alike in groups.values():
-            _take(alike)
+            _take(alike, self._texts)
 
 
 def _reading(chain: Chain) -> _Reading | None:
@@ -66,7 +67,7 @@ def _reading(chain: Chain) -> _Reading | None:
     return None if found is None else _Reading(seat, *found)
 
 
-def _take(alike: Sequence[_Reading]) -> None:
+def _take(alike: Sequence[_Reading], known: MessageTexts) -> None:
     """Publish the blocks of rigs with as many channels that simply follow."""
     seats = [reading.seat for reading in alike]
     sizes = [len(reading.frames) for reading in alike]
@@ -88,7 +89,7 @@ def _take(alike: Sequence[_Reading]) -> None:
         return
     _stamp_rest(seats, taken, blocks)
     firsts = blocks.samples[:, 0, 0].tolist()
-    texts = [seats[row].text(firsts[row], counts[row]) for row in taken]
+    texts = [known.of(seats[row].store, firsts[row], counts[row]) for row in taken]
     starts = [0, *accumulate([text.size for text in texts])]
     to = np.empty(starts[-1], np.uint8)
     with _all_held([seats[row].chain.publisher.ring.lock for row in taken]):

@@ -6,13 +6,9 @@ from daq.acquisition import LONGEST_BLOCK
 from daq.adapters.serial_line import SerialAdapter
 from daq.chain import Chain
 from daq.conditioning import States
-from daq.together.message_text import MessageText
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.delivery import RingArrays, RingStore
 from rigwatch.wire.kept_state import KeptState
-
-MOST_TEXTS = 24
-"""Lengths of blocks whose texts are kept: a rig has few, unless its process was held up."""
 
 
 class RigState(NamedTuple):
@@ -42,6 +38,7 @@ class Seat:
 
     def __init__(self, chain: Chain, adapter: SerialAdapter, store: RingStore) -> None:
         self.chain, self.adapter, self.store = chain, adapter, store
+        self._ring = chain.publisher.ring
         of = chain.acquisition
         clock = of.clock
         self.state = KeptState(
@@ -50,31 +47,17 @@ class Seat:
         self.alike = self.state.kind, adapter.channels
         self.longest = min(of.longest, store.capacity, LONGEST_BLOCK)
         self.channels = [name for name, _, _ in store.layout]
-        self._texts: dict[tuple[int, int], MessageText] = {}
 
     @property
     def lasts(self) -> bool:
-        """Whether the rig still has the boot and the ring of this seat."""
-        chain, boot = self.chain, self.store.boot
-        of = chain.acquisition
-        same = of.tracker.boot == boot == of.conditioner.boot
-        return same and chain.publisher.ring.store_of(boot) is self.store
-
-    def text(self, seq: int, count: int) -> MessageText:
-        """Of a block of so many samples from `seq` on."""
-        alike = count, seq.bit_length() // 7
-        if alike not in self._texts:
-            if len(self._texts) >= MOST_TEXTS:
-                self._texts.clear()
-            self._texts[alike] = MessageText(self.store.empty_block(seq, count))
-        return self._texts[alike]
+        """Whether the rig still has the ring of this seat: each boot's first block begins one."""
+        return self._ring.newest is self.store
 
 
 def seat_of(chain: Chain) -> Seat | None:
     """A seat for a rig on a serial line whose last block has come to its ring."""
-    adapter, boot = chain.adapter, chain.acquisition.tracker.boot
-    store = chain.publisher.ring.store_of(boot)
+    adapter, store = chain.adapter, chain.publisher.ring.newest
     if not isinstance(adapter, SerialAdapter) or store is None:
         return None
-    seat = Seat(chain, adapter, store)
-    return seat if seat.lasts and len(seat.channels) == adapter.channels else None
+    fits = store.boot > 0 and len(store.layout) == adapter.channels
+    return Seat(chain, adapter, store) if fits else None

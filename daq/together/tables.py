@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from daq.adapters.frame_run import read_frames
 from daq.clock import stamp_along
 from daq.conditioning import calibrate
-from daq.sequence import SEQ, take_next
+from daq.sequence import BOOT, SEQ, take_next
 from daq.together.message_text import Text, write_text
 from daq.together.ring_rows import put_run
 from daq.together.seat import RigState
@@ -133,8 +133,9 @@ def keep_and_write(  # noqa: PLR0917
         blocks.flags[r, :n] = flags
         first, device_us, t_ns = samples[0, 0], samples[1, :n], blocks.stamps[r, :n]
         put_run(state.ring, first, device_us, t_ns, values, flags)
-        text = kept(like_text, texts[i])
-        write_text(text, to[starts[i] : starts[i + 1]], first, device_us, t_ns, values, flags)
+        text, message = kept(like_text, texts[i]), to[starts[i] : starts[i + 1]]
+        boot = state.tracker[BOOT]
+        write_text(text, message, boot, first, device_us, t_ns, values, flags)
 
 
 @part()

@@ -216,4 +216,4 @@ def _state(chain: Chain) -> list[object]:
     of = chain.acquisition
     numbers = [of.tracker.count, of.clock.place, of.clock.line, of.conditioner.states.channels]
     kept = [of.samples, of.watch.state, of.watch._samples, dict(of.watch._flagged)]
-    return [*[one.tolist() for one in numbers], *kept, of.clock._finished]
+    return [*[one.tolist() for one in numbers], *kept, of.clock._finished.rows.tolist()]

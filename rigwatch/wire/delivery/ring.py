@@ -177,10 +177,10 @@ class SampleRing:
                 self._stores[-1] = RingStore(block, self._capacity)
             self._stores[-1].add(block)
 
-    def store_of(self, boot: int) -> RingStore | None:
-        """Where samples of a boot are stored, if they came last."""
-        newest = self._stores[-1] if self._stores else None
-        return newest if newest is not None and newest.boot == boot else None
+    @property
+    def newest(self) -> RingStore | None:
+        """Where the block that came last is stored; None before the first."""
+        return self._stores[-1] if self._stores else None
 
     def _start(self, head: SampleBlock) -> None:
         self._token.close()
