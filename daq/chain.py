@@ -28,6 +28,7 @@ class Chain:
         taken: whether what the device has sent was published with that of other rigs already
             (`daq.together`), so that the next step does not read it.
         seat: what those tables keep of this rig.
+        failure: what went wrong there, which the next step raises.
     """
 
     def __init__(self, config: RigConfig, adapter: Adapter, bus: Bus, pulse: Pulse) -> None:
@@ -39,9 +40,12 @@ class Chain:
         self._desk = DeviceDesk(bus, self._known, config.bus.security) if self._known else None
         self.taken = False
         self.seat: object = None
+        self.failure: Exception | None = None
 
     def step(self, wait: float) -> None:
         """Read for at most `wait` [s] and publish what comes of it."""
+        if self.failure is not None:
+            raise self.failure
         taken, self.taken = self.taken, False
         if not taken:
             for raw in self.device.read(wait):

@@ -1,6 +1,7 @@
-"""What a block of nine samples costs in a daq and in a monitor of several rigs, without the bus.
+"""What a block of nine samples costs in daq, monitor and recorder of several rigs, without the bus.
 
     lines in memory ─▶ daq's chains ─▶ blocks ─▶ the monitor's seats ─▶ estimates
+                                         └───────────────┴─▶ recorders ─▶ sessions on disk
 
 One process, a bus in memory, cycles in real time: what the code takes in a process that wakes for a
 moment, without Zenoh and other processes (`many_rigs_chain`). Of many cycles the tenth that other
@@ -25,14 +26,18 @@ from daq.together import Lane
 from monitor.model import load_model
 from monitor.pipeline import compile_together
 from monitor.process.several import Seat, one_turn
+from rigwatch.recorder.process import Recorder, describe_run
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.host import Heartbeat
+from rigwatch.wire.quick_joining import join_quickly
 from rigwatch.wire.rig_config import load_rig
 from tests.waiting import eventually
 from tools.benchmark_table import Row
 
 RIGS, BLOCK = 16, 9
 """Rigs of a process, and samples that each has in a cycle."""
+TURN = 11
+"""Cycles from one turn of the recorders to the next: 0.4 s."""
 WARM_UP = 300
 """Cycles that are not counted: clocks find their line, and references their period."""
 LEAST = 10
@@ -44,18 +49,27 @@ def run(quick: bool) -> list[Row]:
     cycles = 300 if quick else 1500
     with TemporaryDirectory(prefix="rigwatch-blocks-") as name:
         paths = rig_files(Path(name), RIGS)
-        daq, monitor = measured(paths, cycles)
+        daq, monitor, recorder = measured(paths, cycles)
     what = f"a block of {BLOCK} samples, {RIGS} rigs in one process, bus in memory"
     return [
         Row(f"{what}: daq", f"{daq:.0f} µs", "", "", "from the line's bytes to the message", None),
         Row(f"{what}: monitor", f"{monitor:.0f} µs", "", "", "from message to message", None),
+        Row(
+            f"{what}: recorder",
+            f"{recorder:.0f} µs",
+            "",
+            "",
+            f"from messages to the disk, {TURN} blocks and their estimates at a time",
+            None,
+        ),
     ]
 
 
-def measured(paths: list[Path], cycles: int) -> tuple[float, float]:
-    """Processor time of a block in daq and in the monitor [µs]."""
+def measured(paths: list[Path], cycles: int) -> tuple[float, float, float]:
+    """Processor time of a block in daq, in the monitor and in the recorder [µs]."""
     network = MemoryNetwork()
     compile_together(load_model(MODEL))
+    join_quickly()
     lane, lines = Lane(), [Line() for _ in paths]
     chains = [_chain(path, line, network) for path, line in zip(paths, lines, strict=True)]
     seats = [
@@ -63,7 +77,8 @@ def measured(paths: list[Path], cycles: int) -> tuple[float, float]:
         for path in paths
     ]
     eventually(lambda: _all_run(seats), "all rigs")
-    spent: tuple[list[float], list[float]] = [], []
+    recorders = [_recorder(path, network) for path in paths]
+    spent: tuple[list[float], list[float], list[float]] = [], [], []
     began = time.monotonic()
     for number, data in enumerate(_readings(WARM_UP + cycles)):
         for line in lines:
@@ -72,11 +87,17 @@ def measured(paths: list[Path], cycles: int) -> tuple[float, float]:
         time.sleep(max(0.0, began + number * BLOCK / RATE - time.monotonic()))
         spent[0].append(_processor_time(lambda: _step(lane, chains)))
         spent[1].append(_processor_time(lambda: one_turn(seats, contextlib.nullcontext)))
+        if number % TURN == 0:
+            spent[2].append(_processor_time(lambda: _record(recorders)) / TURN)
     assert all(seat.delivered >= cycles * BLOCK for seat in seats), "samples did not arrive"
     for seat in seats:
         seat.close()
-    daq, monitor = (float(np.percentile(one[WARM_UP:], LEAST)) for one in spent)
-    return 1e6 * daq / len(paths), 1e6 * monitor / len(paths)
+    for recorder in recorders:
+        assert recorder.store.samples >= (cycles - TURN) * BLOCK, "samples were not recorded"
+        recorder.close(time.monotonic(), time.time_ns())
+    settled = (one[len(one) * WARM_UP // (WARM_UP + cycles) :] for one in spent)
+    daq, monitor, record = (1e6 * float(np.percentile(one, LEAST)) for one in settled)
+    return daq / len(paths), monitor / len(paths), record / len(paths)
 
 
 class Line:
@@ -107,6 +128,17 @@ def _chain(path: Path, line: Line, network: MemoryNetwork) -> Chain:
     chain = Chain(config, adapter, network.bus(config.rig.id, "daq"), Heartbeat("daq"))
     chain.device.start()
     return chain
+
+
+def _recorder(path: Path, network: MemoryNetwork) -> Recorder:
+    config = load_rig(path)
+    bus = network.bus(config.rig.id, "recorder")
+    return Recorder(config, describe_run(path, config), bus)
+
+
+def _record(recorders: list[Recorder]) -> None:
+    for recorder in recorders:
+        recorder.turn(time.monotonic(), time.time_ns())
 
 
 def _step(lane: Lane, chains: list[Chain]) -> None:

@@ -46,11 +46,16 @@ class Lane:
     def take(self, chains: Sequence[Chain]) -> None:
         """Read the rigs' lines, and publish what can be taken together.
 
-        Each rig's next `step` reads and publishes the rest.
+        Each rig's next `step` reads and publishes the rest, and raises what went wrong with it.
         """
         groups: dict[tuple[str, int], list[_Reading]] = {}
         for chain in chains:
-            if (reading := _reading(chain)) is not None:
+            try:
+                reading = _reading(chain)
+            except Exception as error:  # the others are read
+                chain.failure = error
+                continue
+            if reading is not None:
                 groups.setdefault(reading.seat.alike, []).append(reading)
         for alike in groups.values():
             _take(alike, self._texts)
@@ -107,7 +112,10 @@ def _take(alike: Sequence[_Reading], known: MessageTexts) -> None:
             seats[row].store.newest = firsts[row] + counts[row] - 1
     written = to.tobytes()
     for row, begin, end in zip(taken, starts[:-1], starts[1:], strict=True):
-        _publish(alike[row], blocks, row, written[begin:end])
+        try:
+            _publish(alike[row], blocks, row, written[begin:end])
+        except Exception as error:  # the others' are published
+            seats[row].chain.failure = error
 
 
 def _stamp_rest(seats: Sequence[Seat], taken: Sequence[int], blocks: Blocks) -> None:

@@ -217,3 +217,27 @@ def _state(chain: Chain) -> list[object]:
     numbers = [of.tracker.count, of.clock.place, of.clock.line, of.conditioner.states.channels]
     kept = [of.samples, of.watch.state, of.watch._samples, dict(of.watch._flagged)]
     return [*[one.tolist() for one in numbers], *kept, of.clock._finished.rows.tolist()]
+
+
+def test_one_that_fails_at_the_tables_fails_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock, lane = Clock(), Lane()
+    monkeypatch.setattr(chains, "time", clock)
+    world = World(configs(tmp_path), clock)
+    sending = [Device(np.random.default_rng(n), 40 + n, 0, ("",)) for n in range(5)]
+    for cycle in range(40):
+        clock.now_ns += CYCLE_NS
+        for line, device in zip(world.lines, sending, strict=True):
+            line.put(device.sent())
+        if cycle == 20:
+            monkeypatch.setattr(world.lines[1], "read", lambda _: 1 / 0)
+            monkeypatch.setattr(world.chains[3].publisher, "publish_kept", lambda _: 1 / 0)
+        lane.take(world.chains)
+        for number, chain in enumerate(world.chains):
+            if cycle >= 20 and number in {1, 3}:
+                with pytest.raises(ZeroDivisionError):
+                    chain.step(0.0)
+            else:
+                assert chain.taken == (cycle > 0)
+                chain.step(0.0)

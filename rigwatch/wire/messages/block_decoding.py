@@ -100,7 +100,9 @@ def _one_run(kind: type[K], payloads: Sequence[bytes], gather: Gather) -> K | No
     if first is None or max(map(len, payloads)) > LARGEST_GATHERED:
         return None
     names = first.layout.names
-    alike = [one for one in layouts if one is not None and one.samples and one.names is names]
+    alike: list[Layout] = [
+        one for one in layouts if one is not None and one.samples and one.names is names
+    ]
     if len(alike) < len(layouts):
         return None
     numbers = gather([first.layout, *alike], payloads, first.seq)

@@ -39,46 +39,44 @@ def chunk_writer(output: Any) -> Writer:
 
 
 class ChunkWriter(Writer):
-    """One whose chunks are compressed by zstd, see `chunk_writer`.
-
-    Its attributes are those of the library's class, which names them as its own.
-    """
+    """One whose chunks are compressed by zstd, see `chunk_writer`."""
 
     @property
     def indexes(self) -> Any:
         """Indexes of the chunks so far."""
-        return self._Writer__chunk_indices
+        return self._own._Writer__chunk_indices
 
     @indexes.setter
     def indexes(self, indexes: Any) -> None:
-        self._Writer__chunk_indices = indexes
+        self._own._Writer__chunk_indices = indexes
+
+    @property
+    def _own(self) -> Any:
+        """This object with the attributes that the library's class calls its own."""
+        return self
 
     def _Writer__finalize_chunk(self) -> None:  # noqa: N802 -- as the library calls it
-        builder = self._Writer__chunk_builder
+        own, builder = self._own, self._own._Writer__chunk_builder
         if not builder.num_messages:
             return
-        self._Writer__statistics.chunk_count += 1
+        own._Writer__statistics.chunk_count += 1
         records = builder.end()
         with _compressing:
             packed = _compressor.compress(records)
-        self._Writer__flush()
-        span, start = (builder.message_start_time, builder.message_end_time), self._place()
+        own._Writer__flush()
+        span = builder.message_start_time, builder.message_end_time
         head = (len(records), zlib.crc32(records), len(_NAME), _NAME, len(packed))
         whole = _record(CHUNK, _CHUNK.pack(*span, *head), packed)
-        size, places = len(whole), b""
+        start, size, places = own._Writer__stream.tell(), len(whole), b""
         for number, index in builder.message_indices.items():
             places += _PLACE.pack(number, start + len(whole))
             whole += _messages(number, index.records)
-        self._Writer__data_section_crc = zlib.crc32(whole, self._Writer__data_section_crc)
-        self._Writer__stream.write(whole)
+        own._Writer__data_section_crc = zlib.crc32(whole, own._Writer__data_section_crc)
+        own._Writer__stream.write(whole)
         sizes = _SIZES.pack(len(whole) - size, len(_NAME), _NAME, len(packed), len(records))
         of = _PLACES.pack(*span, start, size, len(places))
         self.indexes.keep(_record(_CHUNK_INDEX, of, places, sizes))
         builder.reset()
-
-    def _place(self) -> int:
-        place: int = self._Writer__stream.tell()
-        return place
 
 
 def _record(kind: int, *parts: bytes) -> bytes:
