@@ -16,7 +16,7 @@ from itertools import accumulate
 
 import numpy as np
 
-from daq.adapters.frame_run import most_frames
+from daq.adapters import most_frames
 from daq.chain import Chain
 from daq.clock import DeviceClock
 from daq.conditioning import Conditioner
@@ -25,6 +25,7 @@ from daq.together.message_text import MessageTexts, Text
 from daq.together.seat import RigState, Seat, seat_of
 from daq.together.tables import Blocks, blocks_for, keep_and_write, number_and_stamp
 from rigwatch.wire.delivery import RingArrays
+from rigwatch.wire.messages import ByteArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,10 +111,12 @@ def _take(alike: Sequence[_Reading], known: MessageTexts) -> None:
         )
         for row in taken:
             seats[row].store.newest = firsts[row] + counts[row] - 1
-    written = to.tobytes()
-    for row, begin, end in zip(taken, starts[:-1], starts[1:], strict=True):
+    written, stamps = to.tobytes(), blocks.stamps[taken, blocks.size[taken] - 1].tolist()
+    for row, begin, end, last_ns in zip(taken, starts[:-1], starts[1:], stamps, strict=True):
+        if blocks.flagged[row]:
+            _count_flags(seats[row], blocks.flags[row, : counts[row]])
         try:
-            _publish(alike[row], blocks, row, written[begin:end])
+            _publish(alike[row], counts[row], last_ns, written[begin:end])
         except Exception as error:  # the others' are published
             seats[row].chain.failure = error
 
@@ -129,16 +132,17 @@ def _stamp_rest(seats: Sequence[Seat], taken: Sequence[int], blocks: Blocks) -> 
             seats[row].chain.publisher.publish([remark])
 
 
-def _publish(reading: _Reading, blocks: Blocks, row: int, payload: bytes) -> None:
-    """Publish a block whose samples are in the ring."""
-    seat, count = reading.seat, int(blocks.size[row])
-    of = seat.chain.acquisition
-    last_ns = int(blocks.stamps[row, count - 1]) - of.clock.unix_ns(0)
+def _count_flags(seat: Seat, flags: ByteArray) -> None:
+    for name, of_channel in zip(seat.channels, flags.T, strict=True):
+        seat.chain.acquisition.watch.count_flags(name, of_channel)
+
+
+def _publish(reading: _Reading, count: int, last_ns: int, payload: bytes) -> None:
+    """Publish a block of so many samples, which are in the ring, the last one of this time [ns]."""
+    seat, of = reading.seat, reading.seat.chain.acquisition
+    last_ns -= of.clock.unix_ns(0)
     of.samples += count
     of.watch.saw_run(seat.store.boot, seat.store.newest, count, last_ns, reading.arrived_ns)
-    if blocks.flagged[row]:
-        for name, flags in zip(seat.channels, blocks.flags[row, :count].T, strict=True):
-            of.watch.count_flags(name, flags)
     seat.adapter.took(count)
     seat.chain.publisher.publish_kept(payload)
     seat.chain.taken = True

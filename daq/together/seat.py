@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from daq.acquisition import LONGEST_BLOCK
-from daq.adapters.serial_line import SerialAdapter
+from daq.adapters import SerialAdapter
 from daq.chain import Chain
 from daq.conditioning import States
 from rigwatch.wire.arrays import FloatArray, IntArray

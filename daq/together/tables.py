@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.adapters.frame_run import read_frames
+from daq.adapters import read_frames
 from daq.clock import stamp_along
 from daq.conditioning import calibrate
 from daq.sequence import BOOT, SEQ, take_next

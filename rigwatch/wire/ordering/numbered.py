@@ -81,12 +81,9 @@ class NumberedRun:
     @classmethod
     def marked(cls, marks: Sequence[bytes], payloads: Sequence[bytes]) -> "NumberedRun | None":
         """The messages received with these marks; None unless each follows the one before."""
-        whole = b"".join(marks)
-        if len(whole) != len(marks) * _PLACE.size:
+        if {*map(len, marks)} != {_PLACE.size}:
             return None
-        found = struct.unpack(f"<{2 * len(marks)}q", whole)
-        run, first = found[:2]
-        follows = (run, *range(first, first + len(marks)))
-        if found[2::2] != (run,) * (len(marks) - 1) or found[1::2] != follows[1:]:
-            return None
-        return cls(run, first, payloads)
+        found = struct.unpack(f"<{2 * len(marks)}q", b"".join(marks))
+        runs, numbers = found[::2], found[1::2]
+        follows = numbers == (*range(numbers[0], numbers[0] + len(numbers)),)
+        return cls(runs[0], numbers[0], payloads) if follows and len({*runs}) == 1 else None
