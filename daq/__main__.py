@@ -11,19 +11,12 @@ from pathlib import Path
 from daq.acquisition import Acquisition
 from daq.adapter import Adapter
 from daq.adapters import adapter_for
-from daq.device_desk import DeviceDesk
-from daq.known_device import KnownDevice, device_file
-from daq.publisher import Publisher
-from daq.supervisor import Supervisor
+from daq.chain import Chain
 from daq.turns import Turns
-from daq.watch import Link
 from rigwatch.wire.bus import Bus, joined
-from rigwatch.wire.delivery import SampleRing
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.host import (
     DAQ,
-    DEVICE_SILENT,
-    NO_SAMPLES,
     Heartbeat,
     Pulse,
     prepare_for_real_time,
@@ -32,55 +25,6 @@ from rigwatch.wire.host import (
     unless_ended,
 )
 from rigwatch.wire.rig_config import RigConfig, load_rig
-
-
-class Chain:
-    """One rig from its device to the bus; `step` takes what has come one link further.
-
-    Args:
-        config: the rig's configuration.
-        adapter: its device, not opened yet.
-        bus: destination of its samples.
-        pulse: told of each step.
-    """
-
-    def __init__(self, config: RigConfig, adapter: Adapter, bus: Bus, pulse: Pulse) -> None:
-        self.device = Supervisor(adapter)
-        self.acquisition = Acquisition(config, adapter.clock_rate)
-        self._publisher = Publisher(bus, SampleRing(bus, config.daq.ring))
-        self._adapter, self._pulse, self._bus = adapter, pulse, bus
-        self._known = _checked(config, adapter, self.acquisition.source)
-        self._desk = DeviceDesk(bus, self._known, config.bus.security) if self._known else None
-
-    def step(self, wait: float) -> None:
-        """Read for at most `wait` [s] and publish what comes of it."""
-        for raw in self.device.read(wait):
-            self._publisher.publish(self.acquisition.update(raw))
-        link, counters = self.device.link, self._adapter.counters()
-        if self._known and self._desk:
-            self._publisher.publish(self._known.events())
-            counters = {**counters, **self._desk.counters}
-        counters = {**counters, "questions_refused": float(self._bus.questions_refused)}
-        self._publisher.publish(self.acquisition.tick(time.monotonic_ns(), link, counters))
-        self._pulse.advance(self.acquisition.samples, _waits(link, self.acquisition.watch.state))
-
-
-def _waits(link: Link, state: str) -> str:
-    """Why no samples come of the device, whose line a start anew would only open again."""
-    if not link.connected or link.text:
-        return link.text or "the device is not open"
-    return NO_SAMPLES if state in DEVICE_SILENT else ""
-
-
-def _checked(config: RigConfig, adapter: Adapter, source: str) -> KnownDevice | None:
-    """The rig's device as it is known, which the adapter checks; None where nothing is checked."""
-    check_against = getattr(adapter, "check_against", None)
-    named = getattr(config.daq.device, "identity", "")
-    if check_against is None or named or config.daq.any_device:
-        return None
-    known = KnownDevice(source, device_file(config))
-    check_against(known)
-    return known
 
 
 def acquire(
@@ -115,7 +59,7 @@ def acquire(
     try:
         while not stop.is_set():
             if turns is not None and at_once and chain.device.connected:
-                turns.serve(in_turns)
+                turns.serve(in_turns, chain)
                 continue
             chain.step(chain.acquisition.patience(time.monotonic_ns()))
             if turns is not None:

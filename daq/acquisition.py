@@ -35,6 +35,10 @@ class Acquisition:
         config: the rig.
         clock_rate: device microseconds in a microsecond of the host, from the adapter.
         host_offset_ns: Unix time less monotonic time of the host [ns].
+
+    Attributes:
+        samples: number of samples so far.
+        longest: most samples that a message takes; 0 before the first one.
     """
 
     def __init__(
@@ -47,7 +51,7 @@ class Acquisition:
         self.device = config.daq.name
         self.source = f"daq/{config.daq.name}"
         self.samples = 0
-        self._most = 0
+        self.longest = 0
         self._host_offset_ns = host_offset_ns
         self.clock = DeviceClock(rate, clock_rate, host_offset_ns())
         self.tracker = SequenceTracker(rate)
@@ -88,6 +92,10 @@ class Acquisition:
         }
         return [*stepped, *self.watch.tick(now_ns, self.clock.unix_ns(now_ns), link, figures)]
 
+    def tick_quietly(self, now_ns: int) -> bool:
+        """`tick` of a device that is open, its line in order; False if there is more to do."""
+        return self.clock.agrees(self._host_offset_ns()) and self.watch.tick_quietly(now_ns)
+
     def patience(self, now_ns: int) -> float:
         """Longest wait for the device before `tick` is due again [s]."""
         return self.watch.silent_in(now_ns)
@@ -111,14 +119,18 @@ class Acquisition:
             part = run if whole else picked(run, slice(start, start + LONGEST_BLOCK))
             stamps, jump = self.clock.stamp(part)
             if jump:
-                text = f"the device's clock jumped by {jump:+.6f} s, its time is anchored anew"
-                messages.append(self._event(int(part.arrived_ns[0]), "warning", "clock_jump", text))
+                messages.append(self.clock_jumped(jump, int(part.arrived_ns[0])))
             block = self.conditioner.condition(part, stamps)
             self.samples += len(block)
             self.watch.saw(block, int(part.arrived_ns[-1]), self.clock.unix_ns(0))
-            self._most = self._most or BlockSize.of(block).samples_in(MAX_PAYLOAD)
-            messages += pieces(block, self._most)
+            self.longest = self.longest or BlockSize.of(block).samples_in(MAX_PAYLOAD)
+            messages += pieces(block, self.longest)
         return messages
+
+    def clock_jumped(self, jump: float, now_ns: int) -> Event:
+        """The remark on a jump of the device's clock [s] at a monotonic time of the host [ns]."""
+        text = f"the device's clock jumped by {jump:+.6f} s, its time is anchored anew"
+        return self._event(now_ns, "warning", "clock_jump", text)
 
     def _restarted(self, restart: Restart, now_ns: int) -> list[Message]:
         self.clock.restart()

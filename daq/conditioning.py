@@ -17,9 +17,10 @@ that is not known, the run must be three times as long.
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from daq.adapter import RawBlock
 from rigwatch.wire.arrays import FloatArray, IntArray
@@ -53,12 +54,25 @@ _STATE = np.dtype(
 )
 
 
+class States(NamedTuple):
+    """What `calibrate` needs of a conditioner; the last field is written to."""
+
+    gain: FloatArray
+    offset: FloatArray
+    limits: FloatArray
+    stuck_after: IntArray
+    channels: NDArray[Any]
+
+
 class Conditioner:
     """Calibrates and flags the samples of one device.
 
     Args:
         channels: the device's channels, in the order of its codes.
         device: the device's name in messages.
+
+    Attributes:
+        states: of the boot whose samples came last, for `calibrate`.
     """
 
     def __init__(self, channels: Sequence[ChannelSection], device: str = "rig") -> None:
@@ -70,6 +84,13 @@ class Conditioner:
         self._limits = np.stack([c.code_low, c.code_high, c.low, c.high, steps])
         self._boot: int | None = None
         self._state = np.zeros(len(self._channels), _STATE)
+        self.states = States(
+            self._calibration.gain,
+            self._calibration.offset,
+            self._limits,
+            self._stuck_after,
+            self._state,
+        )
         self._compile()
 
     def condition(self, raw: RawBlock, t_ns: IntArray) -> SampleBlock:
@@ -81,7 +102,7 @@ class Conditioner:
         """
         if raw.boot != self._boot:
             self._boot = raw.boot
-            self._state = np.zeros(len(self._channels), _STATE)
+            self._state[:] = np.zeros(1, _STATE)
             self._state["since_move"] = np.iinfo(np.int64).max // 2
         # A copy for all channels, as one for each costs more.
         values, flags = (one.T.copy() for one in self._judged(raw))
@@ -107,9 +128,25 @@ class Conditioner:
             flags = raw.quality.copy() if len(raw.quality) else np.zeros(codes.shape, np.uint8)
             _hold_last(values, flags, self._state)
         else:
-            values, flags = self._calibration.values(codes), np.zeros(codes.shape, np.uint8)
-            _judge(codes, values, flags, self._limits, self._stuck_after, self._state)
+            values, flags = np.empty(codes.shape), np.empty(codes.shape, np.uint8)
+            calibrate(self.states, codes, values, flags)
         return values, flags
+
+
+@kernel()
+def calibrate(states: States, codes: FloatArray, values: FloatArray, flags: ByteArray) -> None:
+    """Calibrate and flag samples of the boot that came last.
+
+    Args:
+        states: of the conditioner.
+        codes: shape (n, channels).
+        values, flags: the same shape, filled.
+    """
+    for i in range(codes.shape[0]):
+        for k in range(codes.shape[1]):
+            values[i, k] = codes[i, k] * states.gain[k] + states.offset[k]
+            flags[i, k] = quality.GOOD
+    _judge(codes, values, flags, states.limits, states.stuck_after, states.channels)
 
 
 @kernel()
@@ -141,7 +178,7 @@ def _follow(code: float, moves: float, s: Any) -> None:
         s.since_move = 0
 
 
-@kernel()
+@part()
 def _judge(  # noqa: PLR0917 -- a compiled kernel takes no keywords
     codes: FloatArray,
     values: FloatArray,

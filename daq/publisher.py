@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from rigwatch.wire.bus import Bus
 from rigwatch.wire.delivery import SampleRing
-from rigwatch.wire.messages import Message, SampleBlock, topic_of
+from rigwatch.wire.messages import SAMPLES, Message, SampleBlock, topic_of
 
 
 class Publisher:
@@ -17,11 +17,15 @@ class Publisher:
 
     def __init__(self, bus: Bus, ring: SampleRing) -> None:
         self._bus = bus
-        self._ring = ring
+        self.ring = ring
 
     def publish(self, messages: Iterable[Message]) -> None:
         """Publish messages in order; samples go into the ring first, ready for queries."""
         for message in messages:
             if isinstance(message, SampleBlock):
-                self._ring.add(message)
+                self.ring.add(message)
             self._bus.publish(topic_of(message), message)
+
+    def publish_kept(self, payload: bytes) -> None:
+        """Publish the bytes of samples that are in the ring already."""
+        self._bus.publish_encoded(SAMPLES, payload)

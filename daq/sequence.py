@@ -12,6 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from daq.adapter import RawBlock, picked
+from rigwatch.wire.arrays import IntArray
+from rigwatch.wire.kernel import kernel, part
+from rigwatch.wire.shared_numbers import Shared, shared
 
 _U32 = 1 << 32
 _REPEATS = 1024
@@ -45,6 +48,8 @@ class Restart:
 
 
 Step = RawBlock | Hole | Restart
+_DEVICE_BOOT, BOOT, SEQ, _US, _ARRIVED, _REPEATS_SO_FAR = range(6)
+"""Places of a tracker's numbers in its `count`: of the samples `BOOT`, of the last one `SEQ`."""
 _REPEATED: list[Step] = []
 """Marks a sample as a repeat; compared by identity, distinct from "nothing to report"."""
 
@@ -61,19 +66,31 @@ class SequenceTracker:
         foreign: samples of a second device, dropped.
     """
 
+    _device_boot = Shared[int]("_count", _DEVICE_BOOT)
+    """-1 for none."""
+    boot = Shared[int]("_count", BOOT)
+    """That of the samples delivered."""
+    _seq = Shared[int]("_count", SEQ)
+    _us = Shared[int]("_count", _US)
+    _arrived = Shared[int]("_count", _ARRIVED)
+    _repeats = Shared[int]("_count", _REPEATS_SO_FAR)
+
     def __init__(self, rate: float) -> None:
         self.duplicates = self.foreign = 0
         self._left: dict[int, int] = {}
         self.lost = 0
+        self._count = shared(6, np.int64)
         self._period_us = 1e6 / rate
-        self._device_boot: int | None = None
-        self._boot = 0
+        self._device_boot = self._seq = -1
         self._recounts = 0
-        self._seq = -1
-        self._us = 0
-        self._arrived = 0
-        self._repeats = 0
         self._repeat, self._rising = -2, 0
+        nothing = np.zeros(0, np.int64)
+        take_next(self.count, 0, nothing, nothing, nothing, nothing)  # compiled before it is needed
+
+    @property
+    def count(self) -> IntArray:
+        """Where it stands, for `take_next`."""
+        return np.asarray(self._count)
 
     def accept(self, raw: RawBlock) -> list[Step]:
         """The steps in `raw`, in order: runs, with gaps and restarts between them."""
@@ -81,7 +98,7 @@ class SequenceTracker:
         if next_ones is not None:
             return [next_ones]
         steps: list[Step] = []
-        run = _Run(self._boot)
+        run = _Run(self.boot)
         rows = zip(raw.seq.tolist(), raw.device_us.tolist(), raw.arrived_ns.tolist(), strict=True)
         for index, (seq, us, arrived) in enumerate(rows):
             found = self._place(raw.boot, seq, us, arrived)
@@ -90,33 +107,21 @@ class SequenceTracker:
             if found:
                 steps += run.of(raw)
                 steps += found
-                run = _Run(self._boot)
+                run = _Run(self.boot)
             run.add(index, self._seq, self._us)
         return steps + run.of(raw)
 
     def _next_ones(self, raw: RawBlock) -> RawBlock | None:
-        """The whole block, unwrapped, if each sample is the next one of the same boot.
-
-        What `_place` would do with each of them, in a third of its time.
-        """
-        numbers = raw.seq.tolist()
-        if raw.boot != self._device_boot or not numbers:
+        """The whole block, unwrapped, if each sample is the next one of the same boot."""
+        seq, told, arrived = (
+            np.ascontiguousarray(one, np.int64) for one in (raw.seq, raw.device_us, raw.arrived_ns)
+        )
+        first, device_us = self._seq + 1, np.empty(len(raw), np.int64)
+        if not take_next(self.count, raw.boot, seq, told, arrived, device_us):
             return None
-        ahead = _signed(numbers[0] - self._seq)
-        if ahead != 1 or numbers != [*range(numbers[0], numbers[0] + len(numbers))]:
-            return None
-        unwrapped, us, before = [], self._us, self._arrived
-        for told, arrived in zip(raw.device_us.tolist(), raw.arrived_ns.tolist(), strict=True):
-            elapsed_us = (arrived - before) // 1000
-            us += elapsed_us + _signed(told - us - elapsed_us)
-            before = arrived
-            unwrapped.append(us)
-        first = self._seq + 1
-        self._seq, self._us, self._arrived = self._seq + len(numbers), us, before
-        self._repeats = 0
-        seq, device_us = np.arange(first, self._seq + 1), np.array(unwrapped, np.int64)
+        seq = np.arange(first, self._seq + 1)
         return RawBlock(
-            self._boot, seq, device_us, raw.codes, raw.arrived_ns, raw.calibrated, raw.quality
+            self.boot, seq, device_us, raw.codes, raw.arrived_ns, raw.calibrated, raw.quality
         )
 
     def _place(self, boot: int, seq: int, us: int, arrived: int) -> list[Step]:
@@ -125,7 +130,7 @@ class SequenceTracker:
             self.foreign += 1
             return _REPEATED
         if boot != self._device_boot:
-            reason = "the device has started anew" if self._device_boot is not None else ""
+            reason = "the device has started anew" if self._device_boot >= 0 else ""
             return self._begin(boot, seq, us, arrived, reason)
         ahead = _signed(seq - self._seq)
         elapsed_us = (arrived - self._arrived) // 1000
@@ -138,7 +143,7 @@ class SequenceTracker:
         hole: list[Step] = []
         if ahead > 1:
             self.lost += ahead - 1
-            hole = [Hole(self._boot, self._seq + 1, self._seq + ahead - 1)]
+            hole = [Hole(self.boot, self._seq + 1, self._seq + ahead - 1)]
         self._seq, self._us, self._arrived = self._seq + ahead, self._us + later_us, arrived
         self._repeats = 0
         return hole
@@ -150,7 +155,7 @@ class SequenceTracker:
         if boot in self._left and self._arrived > since:
             self._left[boot] = arrived
             return True
-        if self._device_boot is not None:
+        if self._device_boot >= 0:
             self._left[self._device_boot] = self._arrived
         return False
 
@@ -170,16 +175,16 @@ class SequenceTracker:
 
     def _begin(self, boot: int, seq: int, us: int, arrived: int, reason: str) -> list[Step]:
         """Start a new count; if the device kept its boot, derive a new one from it."""
-        before, first, last = self._boot, self._seq + 1, self._seq
+        before, first, last = self.boot, self._seq + 1, self._seq
         taken = self._taken_for_repeats(boot, seq)
         self._recounts = self._recounts + 1 if boot == self._device_boot else 0
         self._device_boot, self._seq, self._us, self._arrived = boot, seq, us, arrived
-        self._boot = zlib.crc32(f"{boot}/{self._recounts}".encode()) if self._recounts else boot
+        self.boot = zlib.crc32(f"{boot}/{self._recounts}".encode()) if self._recounts else boot
         self._repeats = 0
         if not reason:
-            return [Restart(self._boot, 0, "")]
-        mistaken = [Hole(self._boot, seq - taken, seq - 1)] if taken else []
-        return [Hole(before, first, last), Restart(self._boot, before, reason), *mistaken]
+            return [Restart(self.boot, 0, "")]
+        mistaken = [Hole(self.boot, seq - taken, seq - 1)] if taken else []
+        return [Hole(before, first, last), Restart(self.boot, before, reason), *mistaken]
 
     def _taken_for_repeats(self, boot: int, seq: int) -> int:
         """Samples up to `seq` of a count that began anew, dropped as repeats: they are lost."""
@@ -213,6 +218,48 @@ class _Run:
         return [replace(kept, boot=self._boot, seq=seq, device_us=us)]
 
 
+@kernel()
+def take_next(  # noqa: PLR0917 -- a compiled kernel takes no keywords
+    count: IntArray,
+    boot: int,
+    seq: IntArray,
+    told_us: IntArray,
+    arrived: IntArray,
+    unwrapped: IntArray,
+) -> bool:
+    """Take all samples if each is the next one of the same boot, as nearly always.
+
+    What `SequenceTracker.accept` does with each of them alone, in a small part of its time.
+
+    Args:
+        count: of the tracker.
+        boot: of the samples.
+        seq, told_us: shape (n,), as the device told them.
+        arrived: shape (n,) [ns].
+        unwrapped: shape (n,), filled: the device's clock [µs].
+
+    Returns:
+        Whether they were taken; otherwise the tracker is as before.
+    """
+    if not seq.size or boot != count[_DEVICE_BOOT] or _signed_part(seq[0] - count[SEQ]) != 1:
+        return False
+    for k in range(1, seq.size):
+        if seq[k] != seq[0] + k:
+            return False
+    us, before = count[_US], count[_ARRIVED]
+    for k in range(seq.size):
+        elapsed_us = (arrived[k] - before) // 1000
+        us += elapsed_us + _signed_part(told_us[k] - us - elapsed_us)
+        before = arrived[k]
+        unwrapped[k] = us
+    count[SEQ] += seq.size
+    count[_US], count[_ARRIVED], count[_REPEATS_SO_FAR] = us, before, 0
+    return True
+
+
 def _signed(difference: int) -> int:
     """The difference of two 32-bit counters, allowing for wraps of either."""
     return (difference + _U32 // 2) % _U32 - _U32 // 2
+
+
+_signed_part = part()(_signed)

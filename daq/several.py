@@ -3,7 +3,8 @@
 A device that hangs, is unplugged or does not match its configuration delays no other: it is opened
 in its rig's thread, and read there too unless reading it never waits (`turns.py`). Samples are
 taken in turns: most of the cost of a sample is that of the calls around it, and a message of a turn
-costs daq, bus, monitor and recorder little more than that of one sample.
+costs daq, bus, monitor and recorder little more than that of one sample. What simply follows is
+taken for the rigs of a turn together (`together`).
 """
 
 import threading
@@ -12,6 +13,7 @@ from pathlib import Path
 
 from daq.__main__ import acquire
 from daq.adapters import adapter_for
+from daq.together import Lane
 from daq.turns import Turns
 from rigwatch.wire.bus import SharedLinks, joined
 from rigwatch.wire.host import (
@@ -25,6 +27,7 @@ from rigwatch.wire.host import (
     run_side_by_side,
     set_at_hangup,
     set_at_signal,
+    unless_ended,
 )
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.several_rigs import valid_rigs
@@ -64,7 +67,7 @@ def run_several(paths: list[Path]) -> int:
     raise_priority(DAQ)
     prepare_for_real_time()
     links = SharedLinks(len(paths))
-    turns = Turns(TURN, links.together)
+    turns = Turns(TURN, links.together, before=unless_ended(stop, Lane).take)
     parts = [Part(str(path), work_of(path, links, turns), partial(used, path)) for path in paths]
     run_side_by_side(parts, Heartbeat("daq"), stop, set_at_hangup())
     links.close()

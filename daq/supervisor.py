@@ -5,6 +5,7 @@ The wait between attempts grows from 50 ms to one second, and resets once sample
 
 import time
 from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 from daq.adapter import Adapter, DeviceBusyError, RawBlock
 from daq.watch import Link
@@ -12,6 +13,7 @@ from rigwatch.wire.errors import DeviceError, WireError
 
 _FIRST_WAIT = 0.05
 _LONGEST_WAIT = 1.0
+R = TypeVar("R")
 
 
 class Supervisor:
@@ -75,6 +77,14 @@ class Supervisor:
         if blocks:
             self._wait, self.text = _FIRST_WAIT, ""
         return blocks
+
+    def attempt(self, read: Callable[[], R]) -> R | None:
+        """What `read` reads of the open device, which is lost if that fails."""
+        try:
+            return read()
+        except (DeviceError, WireError) as error:
+            self._lose(error)
+            return None
 
     def close(self) -> None:
         """Close the device."""

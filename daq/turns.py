@@ -13,9 +13,10 @@ rigs, since a message among others costs a tenth of one on its own.
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from typing import Any
 
 Step = Callable[[], bool]
 """One reading of a device; returns whether to continue."""
@@ -25,9 +26,14 @@ SHORTEST_PART = 0.005
 """Shortest part of a turn: the turn of the monitor, which takes what came in it together [s]."""
 
 
+def _each_alone(_subjects: Sequence[Any]) -> None:
+    """Leave all to the rigs' steps."""
+
+
 @dataclass(eq=False)
 class _Served:
     step: Step
+    subject: Any
     ended: threading.Event = field(default_factory=threading.Event)
     error: BaseException | None = None
 
@@ -40,6 +46,7 @@ class Turns:
         together: entered for each part of a turn, so that what it sends leaves together.
         clock: monotonic time [s].
         sleep: waits for a number of seconds.
+        before: called with the subjects of all rigs of a part, before their steps.
     """
 
     def __init__(
@@ -48,16 +55,23 @@ class Turns:
         together: Callable[[], AbstractContextManager[object]],
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
+        before: Callable[[Sequence[Any]], None] = _each_alone,
     ) -> None:
         self.turn = turn
+        self._before = before
         self._together, self._clock, self._sleep = together, clock, sleep
         self._served: list[_Served] = []
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
 
-    def serve(self, step: Step) -> None:
-        """Take `step` in every turn until it returns False; what it raises is raised here."""
-        one = _Served(step)
+    def serve(self, step: Step, subject: Any = None) -> None:
+        """Take `step` in every turn until it returns False; what it raises is raised here.
+
+        Args:
+            step: of the rig.
+            subject: what is done with several rigs before their steps needs of it.
+        """
+        one = _Served(step, subject)
         with self._lock:
             self._served.append(one)
             if self._thread is None:
@@ -81,8 +95,17 @@ class Turns:
         for number in range(parts):
             self._sleep(max(0.0, due + number * self.turn / parts - self._clock()))
             with self._together():
-                for one in rigs[number::parts]:
-                    self._take(one)
+                self._take_part(rigs[number::parts])
+
+    def _take_part(self, rigs: Sequence[_Served]) -> None:
+        try:
+            self._before([one.subject for one in rigs])
+        except Exception as error:  # raised in the threads of all these rigs
+            for one in rigs:
+                self._end(one, error)
+            return
+        for one in rigs:
+            self._take(one)
 
     def _parts_of(self, rigs: int) -> int:
         return max(1, min(rigs // PART, int(self.turn / SHORTEST_PART)))
@@ -95,10 +118,13 @@ class Turns:
 
     def _take(self, one: _Served) -> None:
         try:
-            if one.step():
-                return
+            if not one.step():
+                self._end(one)
         except Exception as error:  # raised in the rig's own thread
-            one.error = error
+            self._end(one, error)
+
+    def _end(self, one: _Served, error: Exception | None = None) -> None:
+        one.error = error
         with self._lock:
             self._served.remove(one)
         one.ended.set()

@@ -47,6 +47,10 @@ class Link:
     trouble: str = ""
 
 
+OPEN = Link(True)
+"""That of a device that is open and in order."""
+
+
 class Watch:
     """Monitors the stream of one device.
 
@@ -83,18 +87,39 @@ class Watch:
 
     def saw(self, block: SampleBlock, arrived_ns: int, unix_minus_monotonic_ns: int) -> None:
         """Count published samples, whose Unix time has this difference to the monotonic clock."""
-        if self._first_ns is None:
-            self._first_ns, self._first_samples = arrived_ns, len(block)
-        self._last_ns = arrived_ns
-        if block.boot != self._boot:
-            self._boot = block.boot
-            self._recent.clear()
-        last = block.seq + len(block) - 1
-        # By the monotonic clock: Unix time that is set forward would look like a pause.
-        self._recent.append((last, int(block.t_ns[-1]) - unix_minus_monotonic_ns))
+        last_ns = int(block.t_ns[-1]) - unix_minus_monotonic_ns
+        self.saw_run(block.boot, block.seq + len(block) - 1, len(block), last_ns, arrived_ns)
         for column in block.channels:
-            self._count_flags(column.name, column.quality)
-        self._samples += len(block)
+            self.count_flags(column.name, column.quality)
+
+    def saw_run(self, boot: int, last: int, count: int, last_ns: int, arrived_ns: int) -> None:
+        """Count published samples without flags.
+
+        Args:
+            boot: theirs.
+            last: number of the last one.
+            count: of them.
+            last_ns: the last one's time on the monotonic clock: Unix time that is set forward would
+                look like a pause [ns].
+            arrived_ns: when the last one arrived [ns].
+        """
+        if self._first_ns is None:
+            self._first_ns, self._first_samples = arrived_ns, count
+        self._last_ns = arrived_ns
+        if boot != self._boot:
+            self._boot = boot
+            self._recent.clear()
+        self._recent.append((last, last_ns))
+        self._samples += count
+
+    def tick_quietly(self, now_ns: int) -> bool:
+        """`tick` of a device that is open, its line in order; False if there is more to do."""
+        if self._second_ns is None or now_ns - self._second_ns >= _SECOND:
+            return False
+        if not self._outside.get("", 0) or self._judge(now_ns, OPEN)[0] != self.state:
+            return False
+        self._forget_old()
+        return True
 
     def silent_in(self, now_ns: int) -> float:
         """Time until the device counts as stale [s], at least a millisecond."""
@@ -114,6 +139,8 @@ class Watch:
         if second_over:
             messages += self._second(now_ns, unix_ns, counters)
         state, text = self._judge(now_ns, link)
+        if state in {"slow", "running"}:
+            self._forget_old()
         if state != self.state or (state == "reconnecting" and text != self._text):
             messages += self._changed(state, text, unix_ns)
         if second_over or messages:
@@ -140,9 +167,13 @@ class Watch:
         if len(self._recent) < 2 or self._recent[-1][0] - self._recent[0][0] < _SLOW_OVER:
             return self._rate
         (first, start), (last, end) = self._recent[0], self._recent[-1]
-        while len(self._recent) > 2 and last - self._recent[1][0] >= _SLOW_OVER:
-            self._recent.popleft()
         return (last - first) * 1e9 / max(end - start, 1) / self._clock_rate
+
+    def _forget_old(self) -> None:
+        """Keep what the next rate needs, once one was told."""
+        recent = self._recent
+        while len(recent) > 2 and recent[-1][0] - recent[1][0] >= _SLOW_OVER:
+            recent.popleft()
 
     def _changed(self, state: str, text: str, unix_ns: int) -> list[Message]:
         was, self.state, self._text = self.state, state, text
@@ -223,7 +254,8 @@ class Watch:
             for name in wrong
         ]
 
-    def _count_flags(self, channel: str, flags: np.ndarray) -> None:
+    def count_flags(self, channel: str, flags: np.ndarray) -> None:
+        """Count the flags of a channel's samples."""
         if not np.count_nonzero(flags):  # a quarter of what `any` takes
             return
         for bit, name in quality.NAMES.items():

@@ -1,6 +1,7 @@
-"""What a block of nine samples costs in a daq and in a monitor of several rigs, without the bus.
+"""What a block of nine samples costs in daq, monitor and recorder of several rigs, without the bus.
 
     lines in memory ─▶ daq's chains ─▶ joined blocks ─▶ the monitor's seats ─▶ joined estimates
+                                            └───────────────┴─▶ recorders ─▶ sessions on disk
 
 One process, a bus in memory, cycles in real time: what the code takes in a process that wakes for a
 moment, without Zenoh and other processes (`many_rigs_chain`). Of many cycles the tenth that other
@@ -18,15 +19,18 @@ import numpy as np
 from benchmarks.archives.recordings import MODEL, RATE
 from benchmarks.processes.many_devices import encoded
 from benchmarks.processes.many_rigs_chain import rig_files
-from daq.__main__ import Chain
 from daq.adapters.serial_line import SerialAdapter
+from daq.chain import Chain
+from daq.together import Lane
 from monitor.model import load_model
 from monitor.pipeline import compile_together
 from monitor.process.several import Seat, one_turn
 from monitor.process.table import Tables, compile_table
+from rigwatch.recorder.process import Recorder, describe_run
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.host import Heartbeat
 from rigwatch.wire.messages import ESTIMATES
+from rigwatch.wire.quick_joining import join_quickly
 from rigwatch.wire.rig_config import load_rig
 from tests.many_rigs.memory_links import MemoryLinks
 from tests.waiting import eventually
@@ -34,6 +38,8 @@ from tools.benchmark_table import Row
 
 RIGS, BLOCK = (16, 48), 9
 """Rigs of a process, and samples that each has in a cycle."""
+TURN = 11
+"""Cycles from one turn of the recorders to the next: 0.4 s."""
 WARM_UP = 300
 """Cycles that are not counted: clocks find their line, and references their period."""
 LEAST = 10
@@ -48,22 +54,31 @@ def run(quick: bool) -> list[Row]:
 def rows_of(rigs: int, cycles: int) -> list[Row]:
     """The rows of so many rigs."""
     with TemporaryDirectory(prefix="rigwatch-blocks-") as name:
-        daq, monitor = measured(rig_files(Path(name), rigs), cycles)
+        daq, monitor, recorder = measured(rig_files(Path(name), rigs), cycles)
     what = f"a block of {BLOCK} samples, {rigs} rigs in one process, bus in memory"
     return [
         Row(f"{what}: daq", f"{daq:.0f} µs", "", "", "from the line's bytes to the message", None),
         Row(f"{what}: monitor", f"{monitor:.0f} µs", "", "", "from message to message", None),
+        Row(
+            f"{what}: recorder",
+            f"{recorder:.0f} µs",
+            "",
+            "",
+            f"from messages to the disk, {TURN} blocks and their estimates at a time",
+            None,
+        ),
     ]
 
 
-def measured(paths: list[Path], cycles: int) -> tuple[float, float]:
-    """Processor time of a block in daq and in the monitor [µs]."""
+def measured(paths: list[Path], cycles: int) -> tuple[float, float, float]:
+    """Processor time of a block in daq, in the monitor and in the recorder [µs]."""
     network = MemoryNetwork()
-    of_daq, links, of_listener = (MemoryLinks(network) for _ in range(3))
+    of_daq, links, of_listener, of_recorder = (MemoryLinks(network) for _ in range(4))
     model = load_model(MODEL)
     compile_together(model)
     compile_table(model)
-    lines = [Line() for _ in paths]
+    join_quickly()
+    lane, lines = Lane(), [Line() for _ in paths]
     chains = [_chain(path, line, of_daq) for path, line in zip(paths, lines, strict=True)]
     heard = [of_listener.bus(path.stem, "listener").subscribe(ESTIMATES) for path in paths]
     seats = [
@@ -81,12 +96,19 @@ def measured(paths: list[Path], cycles: int) -> tuple[float, float]:
 
     def step() -> None:
         with of_daq.together():
+            lane.take(chains)
             for chain in chains:
                 chain.step(0.0)
 
+    def record() -> None:
+        of_recorder.collect()
+        for recorder in recorders:
+            recorder.turn(time.monotonic(), time.time_ns())
+
     eventually(all_run, "all rigs")
+    recorders = [_recorder(path, of_recorder) for path in paths]
     counted = 0
-    spent: tuple[list[float], list[float]] = [], []
+    spent: tuple[list[float], list[float], list[float]] = [], [], []
     began = time.monotonic()
     for number, data in enumerate(_readings(WARM_UP + cycles)):
         for line in lines:
@@ -95,13 +117,19 @@ def measured(paths: list[Path], cycles: int) -> tuple[float, float]:
         time.sleep(max(0.0, began + number * BLOCK / RATE - time.monotonic()))
         spent[0].append(_processor_time(step))
         spent[1].append(_processor_time(turn))
+        if number % TURN == 0:
+            spent[2].append(_processor_time(record) / TURN)
         of_listener.collect()
         counted += sum(len(block) for one in heard for block in one.drain())
     assert counted >= len(paths) * cycles * BLOCK, "estimates did not arrive"
     for seat in seats:
         seat.close()
-    daq, monitor = (float(np.percentile(one[WARM_UP:], LEAST)) for one in spent)
-    return 1e6 * daq / len(paths), 1e6 * monitor / len(paths)
+    for recorder in recorders:
+        assert recorder.store.samples >= (cycles - TURN) * BLOCK, "samples were not recorded"
+        recorder.close(time.monotonic(), time.time_ns())
+    settled = (one[len(one) * WARM_UP // (WARM_UP + cycles) :] for one in spent)
+    daq, monitor, record = (1e6 * float(np.percentile(one, LEAST)) for one in settled)
+    return daq / len(paths), monitor / len(paths), record / len(paths)
 
 
 class Line:
@@ -132,6 +160,12 @@ def _chain(path: Path, line: Line, links: MemoryLinks) -> Chain:
     chain = Chain(config, adapter, links.bus(config.rig.id, "daq"), Heartbeat("daq"))
     chain.device.start()
     return chain
+
+
+def _recorder(path: Path, links: MemoryLinks) -> Recorder:
+    config = load_rig(path)
+    bus = links.bus(config.rig.id, "recorder")
+    return Recorder(config, describe_run(path, config), bus)
 
 
 def _readings(count: int) -> Iterator[bytes]:

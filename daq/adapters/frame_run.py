@@ -36,21 +36,37 @@ def read_run(whole: bytes, channels: int, arrived_ns: int) -> RawBlock | None:
     Returns:
         None if a frame is damaged, of another shape, or not of the first one's boot.
     """
-    most = len(whole) // (HEAD_SIZE + 2 * channels + CRC_SIZE) + 1
+    most = most_frames(len(whole), channels)
     numbers, codes = np.empty((2, most), np.int64), np.empty((most, channels), np.int16)
     boot = np.empty(1, np.int64)
-    found = _read(np.frombuffer(whole, np.uint8), VERSION, boot, numbers, codes)
+    found = read_frames(np.frombuffer(whole, np.uint8), VERSION, boot, numbers, codes)
     if found <= 0:
         return None
     seq, device_us = numbers[:, :found]
     return RawBlock(int(boot[0]), seq, device_us, codes[:found], np.full(found, arrived_ns))
 
 
+def most_frames(size: int, channels: int) -> int:
+    """How many frames so many bytes hold at most."""
+    return size // (HEAD_SIZE + 2 * channels + CRC_SIZE) + 1
+
+
 @kernel(allocates=True)
-def _read(
+def read_frames(
     data: ByteArray, version: int, boot: IntArray, numbers: IntArray, codes: NDArray[np.int16]
 ) -> int:
-    """Number of frames, whose contents are written to the arrays; -1 if one is not usual."""
+    """Read encoded frames with a delimiter between each two.
+
+    Args:
+        data: the frames.
+        version: of frames.
+        boot: shape (1,), filled.
+        numbers: shape (2, `most_frames`), filled: of the samples, and the device's clock [µs].
+        codes: shape (`most_frames`, channels), filled.
+
+    Returns:
+        Their number; -1 if one is damaged, of another shape, or not of the first one's boot.
+    """
     channels = codes.shape[1]
     size = HEAD_SIZE + 2 * channels + CRC_SIZE
     frame = np.empty(LONGEST, np.uint8)

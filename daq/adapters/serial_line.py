@@ -52,6 +52,7 @@ class SerialPort:
         self.port = port
         self.baud = baud
         self._serial: serial.Serial | None = None
+        self._fd = -1
 
     def open(self) -> None:
         """Open the first match of the pattern.
@@ -64,6 +65,7 @@ class SerialPort:
         self._serial = first_that_opens(
             self.port, lambda path: serial.Serial(path, self.baud, timeout=0, exclusive=True)
         )
+        self._fd = self._serial.fileno()
 
     def read(self, timeout: float) -> bytes:
         """The bytes available within `timeout` [s].
@@ -74,8 +76,10 @@ class SerialPort:
         if self._serial is None:
             raise DeviceError(f"{self.port} is not open")
         try:
-            fd = self._serial.fileno()
-            data = os.read(fd, _CHUNK) if ready_to_read((fd,), timeout) else None
+            fd = self._fd
+            data = os.read(fd, _CHUNK) if timeout <= 0.0 else None
+            if not data:  # which does not tell whether the line was closed
+                data = os.read(fd, _CHUNK) if ready_to_read((fd,), timeout) else None
         except BlockingIOError:
             return b""
         except OSError as error:
@@ -131,6 +135,9 @@ class SerialAdapter:
         source: the line.
         channels: number of channels a frame must have.
         clock: monotonic time [ns].
+
+    Attributes:
+        channels: number of channels of a frame.
     """
 
     clock_rate = 1.0
@@ -141,14 +148,17 @@ class SerialAdapter:
     ) -> None:
         self._source = source
         self._clock = clock
-        self._channels = channels
+        self.channels = channels
         self._decoder = FrameDecoder()
         self._bytes = 0
+        self._received: tuple[bytes, int] | None = None
+        self._rest = b""
         read_run(b"", channels, 0)  # compiled before the first sample arrives
 
     def open(self) -> None:
         """Open the line; drops an unfinished frame from before."""
         self._decoder.forget()
+        self._received = None
         self._source.open()
 
     def read(self, timeout: float) -> Sequence[RawBlock]:
@@ -157,18 +167,45 @@ class SerialAdapter:
         Raises:
             DeviceError: the line is gone, or frames have a different number of channels.
         """
-        data = self._source.read(timeout)
-        arrived = self._clock()
-        self._bytes += len(data)
-        run = self._decoder.feed_run(data, lambda whole: read_run(whole, self._channels, arrived))
+        data, arrived = self._received or self._receive(timeout)
+        self._received = None
+        run = self._decoder.feed_run(data, lambda whole: read_run(whole, self.channels, arrived))
         if run is not None:
             return [run]
         frames = self._decoder.feed(data)
         for frame in frames:
-            if len(frame.codes) != self._channels:
+            if len(frame.codes) != self.channels:
                 found = f"the device sends {len(frame.codes)} channels"
-                raise DeviceError(f"{found}, the configuration has {self._channels}")
+                raise DeviceError(f"{found}, the configuration has {self.channels}")
         return [_block(list(run), arrived) for _, run in groupby(frames, lambda f: f.boot)]
+
+    def receive(self) -> tuple[bytes, int] | None:
+        """Read what has come; whole frames among it, and when the last byte arrived [ns].
+
+        Whoever has read all of the frames calls `took`; otherwise the next `read` returns them.
+
+        Returns:
+            None if there are none, or only `read` may take them.
+
+        Raises:
+            DeviceError: the line is gone.
+        """
+        data, arrived = self._received = self._receive(0.0)
+        found = self._decoder.completed(data)
+        if found is None:
+            return None
+        whole, self._rest = found
+        return whole, arrived
+
+    def took(self, frames: int) -> None:
+        """Count so many frames of those that `receive` has returned, which were all."""
+        self._decoder.took(frames, self._rest)
+        self._received = None
+
+    def _receive(self, timeout: float) -> tuple[bytes, int]:
+        data = self._source.read(timeout)
+        self._bytes += len(data)
+        return data, self._clock()
 
     def close(self) -> None:
         """Close the line."""

@@ -22,6 +22,9 @@ from rigwatch.wire.host import (
 from rigwatch.wire.rig_config import load_rig, rig_text
 from rigwatch.wire.several_rigs import valid_rigs
 
+MANY = 32
+"""Rigs from which on blocks are read by a compiled call: the compiler takes 130 MB once."""
+
 
 def work_of(path: Path, notes: str, folders: dict[Path, Path], links: SharedLinks) -> Work:
     """The recording of one rig; it writes its session's folder into `folders` at its end."""
@@ -49,6 +52,10 @@ def run_several(paths: list[Path], stop: threading.Event, notes: str = "") -> li
         ConfigError: no configuration is valid, or two are of one rig.
     """
     use_few_pools()
+    if len(paths) >= MANY:
+        from rigwatch.wire.quick_joining import join_quickly  # with the compiler
+
+        join_quickly()
     folders: dict[Path, Path] = {}
     valid_rigs(paths)  # a wrong file is named by its rig's thread
     keep_memory_tidy(stop)

@@ -26,7 +26,7 @@ from rigwatch.wire.messages import (
     encode,
     remember,
 )
-from rigwatch.wire.ordering import OPEN, Ask, Numbered
+from rigwatch.wire.ordering import OPEN, Ask, Numbered, RingReply
 from tests.bus.rig import TestRig, answers, kill
 from tests.waiting import PATIENCE, eventually, wait_until
 
@@ -80,6 +80,63 @@ def test_what_takes_many_answers_of_the_ring_is_caught_up_with_in_one_call():
 
     eventually(begun, "the first answer")
     assert found == list(range(said.stop + 1))
+
+
+class Listening:
+    """A subscription to which messages are handed, and what it asks rings for."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, *, quick: bool) -> None:
+        self.asked: list[Ask] = []
+        self.of = MemoryNetwork().bus("r", "listener").listen(ESTIMATES)
+        self.quickly = 0
+        monkeypatch.setattr(self.of._questions, "ask", lambda _, ask: self.asked.append(ask))
+        if not quick:
+            monkeypatch.setattr(self.of, "_took_run", lambda _: False)
+
+    def take(self, waiting: list[tuple[object, ...]]) -> None:
+        if self.of._took_run(waiting):
+            self.quickly += 1
+            return
+        for one in waiting:
+            self.of._take(one)
+
+    def stands(self) -> tuple[object, ...]:
+        of = self.of
+        return [*of._ready], of.foreign, of.rejected, of.positions(), self.asked
+
+
+def test_messages_that_wait_together_are_taken_as_one_by_one(monkeypatch) -> None:
+    """Some are lost, twice there, a stranger's, of another run, or with a mark that is none."""
+    random, run, since, number = np.random.default_rng(3), 7, 5, -1
+    quick, alone = Listening(monkeypatch, quick=True), Listening(monkeypatch, quick=False)
+    fates = ["", "lost", "again", "strange", "unknown run", "no mark", "another run"]
+    for turn in range(3000):
+        waiting: list[tuple[object, ...]] = []
+        if turn == 0:
+            waiting.append(("monitor", ("monitor", run, since, "id"), True, True))
+        for _ in range(int(random.integers(1, 12))):
+            fate = random.choice(fates, p=[0.985, *[0.0025] * 6])
+            number += {"lost": 2, "again": 0}.get(fate, 1)
+            if fate == "another run":
+                waiting.append(("monitor", ("monitor", run, since, "id"), False, True))
+                run, since, number = run + 1, since + 1, 0
+                waiting.append(("monitor", ("monitor", run, since, "id"), True, True))
+            of = Numbered(9999 if fate == "unknown run" else run, number, b"%d" % turn)
+            mark = b"1" if fate == "no mark" else of.mark
+            waiting.append((of.payload, "other" if fate == "strange" else "id", mark))
+        for listener in (quick, alone):
+            listener.take(waiting)
+        assert quick.stands() == alone.stands(), turn
+        for listener in (quick, alone):
+            listener.of._ready.clear()
+            if listener.asked:  # which the ring does not have
+                ask = listener.asked.pop()
+                settled = ask.first - 1 if ask.last == OPEN else ask.last
+                reply = RingReply(ask.boot, settled, ()).to_bytes()
+                listener.of._take(("monitor", ask, [reply], None))
+    assert quick.quickly > 1000
+    assert quick.of.foreign > 10
+    assert quick.of.rejected > 10
 
 
 def test_estimates_that_wait_together_are_one_block_up_to_a_gap_and_invalid_ones_are_counted():

@@ -504,7 +504,7 @@ def test_a_fresh_sample_ends_the_suspicion() -> None:
 class StepByStep(SampleOrder[SampleBlock]):
     """Takes no short way for a block that simply follows the last one."""
 
-    def _goes_on(self, block: SampleBlock) -> bool:
+    def goes_on(self, block: SampleBlock) -> bool:
         return False
 
 

@@ -72,7 +72,14 @@ class Member:
         Raises:
             BusError: the message is larger than the bus carries.
         """
-        payload = encode(message)
+        self.publish_encoded(topic, encode(message))
+
+    def publish_encoded(self, topic: Topic, payload: bytes) -> None:
+        """The same with the bytes of a message.
+
+        Raises:
+            BusError: they are more than the bus carries.
+        """
         largest = LARGEST_NUMBERED if topic.numbered else MAX_PAYLOAD
         if len(payload) > largest:
             size = f"found a message of {len(payload)} bytes, expected at most {largest}"

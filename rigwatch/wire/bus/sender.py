@@ -6,7 +6,15 @@ a run that has ended are therefore taken for a while, from its owner only and in
 
 import time
 
-from rigwatch.wire.ordering import Ask, Numbered, Outcome, Owners, RingReply, SampleOrder
+from rigwatch.wire.ordering import (
+    Ask,
+    Numbered,
+    NumberedRun,
+    Outcome,
+    Owners,
+    RingReply,
+    SampleOrder,
+)
 
 MOST_WAITING = 16384
 """Messages that may wait behind a gap: minutes of estimates, which are most of them."""
@@ -57,6 +65,11 @@ class Sender:
         if not self._may_speak(message.boot) or not self._owners.admits(message.boot, sender):
             return None
         return self.order.on_block(message)
+
+    def goes_on(self, run: NumberedRun, sender: str) -> bool:
+        """Deliver messages that simply follow the last one, as nearly all do; else do nothing."""
+        admitted = self._may_speak(run.boot) and self._owners.admits(run.boot, sender)
+        return admitted and self.order.goes_on(run)
 
     def is_owner(self, sender: str) -> bool:
         """Whether `sender` owns a run that lives, or has just ended."""

@@ -6,7 +6,12 @@
 The logic is in `ordering`, which is also used for alarms and estimates.
 """
 
-from rigwatch.wire.delivery.ring import SOURCE_KEY, SampleRing
+from rigwatch.wire.delivery.ring import (
+    SOURCE_KEY,
+    RingArrays,
+    RingStore,
+    SampleRing,
+)
 from rigwatch.wire.delivery.sample_reader import Item, SampleReader
 from rigwatch.wire.ordering import LARGEST_SEQ, POSITION_WRONG, Counters
 
@@ -16,6 +21,8 @@ __all__ = [
     "SOURCE_KEY",
     "Counters",
     "Item",
+    "RingArrays",
+    "RingStore",
     "SampleReader",
     "SampleRing",
 ]

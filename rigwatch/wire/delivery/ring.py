@@ -7,12 +7,14 @@ readers may still need, and declares a liveliness token for the boot that has co
 
 import threading
 import time
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.bus import MAX_PAYLOAD, Bus
-from rigwatch.wire.messages import RING_KEY, BlockSize, Column, SampleBlock
+from rigwatch.wire.messages import RING_KEY, BlockSize, ByteArray, Column, SampleBlock
 from rigwatch.wire.ordering import UNKNOWN, Ask, RingReply
 
 SOURCE_KEY = "source"
@@ -24,12 +26,26 @@ REPLY_BYTES = MAX_PAYLOAD // 2
 """Largest size of a reply [bytes]: samples of many channels fill it before they are too many."""
 
 
+class RingArrays(NamedTuple):
+    """The samples of a `RingStore`: shape (capacity,), of channels (channels, capacity)."""
+
+    seq: IntArray
+    device_us: IntArray
+    t_ns: IntArray
+    values: FloatArray
+    quality: ByteArray
+
+
 class RingStore:
     """The last samples of one boot.
 
     Args:
         head: a block of that boot; all others have the same columns.
         capacity: number of samples stored.
+
+    Attributes:
+        newest: number of the newest sample.
+        arrays: the samples, for a compiled call that adds many, whose caller counts up `newest`.
     """
 
     def __init__(self, head: SampleBlock, capacity: int) -> None:
@@ -43,6 +59,9 @@ class RingStore:
         self._t_ns = np.zeros(capacity, np.int64)
         self._values = np.zeros((n, capacity))
         self._quality = np.zeros((n, capacity), np.uint8)
+        self.arrays = RingArrays(
+            self._seq, self._device_us, self._t_ns, self._values, self._quality
+        )
 
     def add(self, block: SampleBlock) -> None:
         """Store the samples of a block, replacing those `capacity` earlier."""
@@ -92,6 +111,15 @@ class RingStore:
         """The oldest sample stored."""
         return self._block(np.array([self._seq[self._seq >= 0].min()]))
 
+    def empty_block(self, seq: int, count: int) -> SampleBlock:
+        """A block of so many zeros, with what all blocks of this boot have in common."""
+        none, times = np.zeros(0, np.uint8), np.zeros(count, np.int64)
+        columns = [
+            Column(name, unit, np.zeros(count), np.zeros(count, np.uint8) if judged else none)
+            for name, unit, judged in self.layout
+        ]
+        return SampleBlock(self.device, self.boot, seq, times, times, tuple(columns))
+
     def _block(self, seq: NDArray[np.int64]) -> SampleBlock:
         rows = seq % self.capacity
         channels = tuple(
@@ -126,12 +154,15 @@ class SampleRing:
     Args:
         bus: on which readers send queries.
         capacity: number of samples stored per boot.
+
+    Attributes:
+        lock: held while what is stored changes.
     """
 
     def __init__(self, bus: Bus, capacity: int) -> None:
         self._capacity = capacity
         self._stores: list[RingStore] = []
-        self._lock = threading.Lock()
+        self.lock = threading.Lock()
         self._token = bus.named_token(SOURCE_KEY)
         self._close = bus.serve(RING_KEY, self._answer)
 
@@ -141,20 +172,25 @@ class SampleRing:
             return
         if not self._stores or self._stores[-1].boot != block.boot:
             self._start(block)
-        with self._lock:
+        with self.lock:
             if self._stores[-1].layout != _layout(block):
                 self._stores[-1] = RingStore(block, self._capacity)
             self._stores[-1].add(block)
 
+    @property
+    def newest(self) -> RingStore | None:
+        """Where the block that came last is stored; None before the first."""
+        return self._stores[-1] if self._stores else None
+
     def _start(self, head: SampleBlock) -> None:
         self._token.close()
-        with self._lock:
+        with self.lock:
             self._stores = [*self._stores[-1:], RingStore(head, self._capacity)]
         self._token.declare(f"{head.boot}/{time.time_ns()}")
 
     def _answer(self, question: bytes) -> list[bytes]:
         ask = Ask.from_bytes(question)
-        with self._lock:
+        with self.lock:
             known = [store for store in self._stores if store.boot == ask.boot]
             reply = known[-1].reply(ask) if known else self._unknown(ask.boot)
         return [reply.to_bytes()]

@@ -131,14 +131,24 @@ class FrameDecoder:
         Returns:
             None if `data` is to be fed with `feed`: nothing has been taken from it.
         """
-        whole, found, rest = (self._rest + data).rpartition(DELIMITER)
-        if not found or self._lost or len(rest) > LONGEST:
-            return None
-        run = read(whole)
-        if run is not None:
-            self._rest = rest
-            self.good += len(run)
+        found = self.completed(data)
+        run = None if found is None else read(found[0])
+        if found is not None and run is not None:
+            self.took(len(run), found[1])
         return run
+
+    def completed(self, data: bytes) -> tuple[bytes, bytes] | None:
+        """The frames that `data` completes, and its rest; None if only `feed` may take it.
+
+        Whoever has read all of the frames calls `took`; otherwise nothing has been taken.
+        """
+        whole, found, rest = (self._rest + data).rpartition(DELIMITER)
+        return None if not found or self._lost or len(rest) > LONGEST else (whole, rest)
+
+    def took(self, frames: int, rest: bytes) -> None:
+        """Count frames that `completed` gave, and keep what has come after them."""
+        self._rest = rest
+        self.good += frames
 
     def forget(self) -> None:
         """Drop an unfinished frame, as after a closed line; its bytes count as skipped."""

@@ -1,6 +1,8 @@
 """Free space on a disk."""
 
-import shutil
+import os
+from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 
@@ -10,11 +12,16 @@ def free_share(folder: Path) -> float:
     Blocks that the file system keeps for its administrator count neither as free nor as the
     disk's, as in `df`. If the folder does not exist yet, its nearest existing parent is used.
     """
-    for place in (folder, *folder.absolute().parents):
+    for place in chain((folder,), _above(folder)):
         try:
-            found = shutil.disk_usage(place)
+            found = os.statvfs(place)
         except OSError:
             continue
-        usable = found.used + found.free
-        return found.free / usable if usable else float("nan")
+        usable = found.f_blocks - found.f_bfree + found.f_bavail
+        return found.f_bavail / usable if usable else float("nan")
     return float("nan")
+
+
+def _above(folder: Path) -> Iterator[Path]:
+    """The parents, which are looked for only where they are needed."""
+    yield from folder.absolute().parents

@@ -7,7 +7,7 @@ touching a value; `block_size` tells how many samples a message holds.
 """
 
 from rigwatch.wire.messages import blocks, protobuf_schema, quality_flags
-from rigwatch.wire.messages.block_decoding import Numbers, block_of
+from rigwatch.wire.messages.block_decoding import Numbers, block_of, gather_with
 from rigwatch.wire.messages.block_size import BlockSize
 from rigwatch.wire.messages.blocks import (
     Block,
@@ -166,6 +166,7 @@ __all__ = [
     "decode_all",
     "decode_block",
     "encode",
+    "gather_with",
     "is_of_structure",
     "is_remembered",
     "is_source",

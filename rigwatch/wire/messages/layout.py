@@ -3,6 +3,7 @@
 import struct
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,6 +92,11 @@ class Layout:
         """Offsets of the quality of the columns that have it; shape (columns, samples)."""
         starts = [place.quality for place in self.columns if place.quality >= 0]
         return np.add.outer(np.array(starts, np.intp), np.arange(self.samples))
+
+    @cached_property
+    def notes(self) -> dict[object, Any]:
+        """What readers keep with it, each under a key of its own."""
+        return {}
 
     @cached_property
     def shared(self) -> NDArray[np.intp]:

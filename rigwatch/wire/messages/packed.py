@@ -80,6 +80,11 @@ def layout_of(kind: type[Any], data: bytes) -> Layout:
     return layout
 
 
+def known_layout(kind: type[Any], data: bytes) -> Layout | None:
+    """The layout that `data` has, if it is one that an earlier block had: not compared yet."""
+    return _layouts.get((kind, len(data), data[1])) if len(data) > 1 else None
+
+
 def _fits(layout: Layout, data: bytes) -> bool:
     for span in (layout.boot, layout.seq):
         if span is not None and filling(data[span[0] : span[1]]) is None:

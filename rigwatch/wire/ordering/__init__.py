@@ -8,7 +8,7 @@ same logic. `sender_rates` bounds what each client may send; `set_clock` tells b
 of samples was set.
 """
 
-from rigwatch.wire.ordering.numbered import Numbered
+from rigwatch.wire.ordering.numbered import Numbered, NumberedRun
 from rigwatch.wire.ordering.outcomes import (
     FORGED,
     POSITION_WRONG,
@@ -35,6 +35,7 @@ __all__ = [
     "Counters",
     "Loss",
     "Numbered",
+    "NumberedRun",
     "Outcome",
     "Owners",
     "PastRun",

@@ -6,6 +6,7 @@ To the ordering logic a run is a boot and a message a block of one sample.
 """
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -63,3 +64,26 @@ class Numbered:
             MessageError: there are too few bytes.
         """
         return cls.marked(data[: _PLACE.size], data[_PLACE.size :])
+
+
+@dataclass(frozen=True, slots=True)
+class NumberedRun:
+    """Messages of a run that follow one another, the first of them numbered `seq`."""
+
+    boot: int
+    seq: int
+    payloads: Sequence[bytes]
+    t_ns: ClassVar[tuple[int]] = Numbered.t_ns
+
+    def __len__(self) -> int:
+        return len(self.payloads)
+
+    @classmethod
+    def marked(cls, marks: Sequence[bytes], payloads: Sequence[bytes]) -> "NumberedRun | None":
+        """The messages received with these marks; None unless each follows the one before."""
+        if {*map(len, marks)} != {_PLACE.size}:
+            return None
+        found = struct.unpack(f"<{2 * len(marks)}q", b"".join(marks))
+        runs, numbers = found[::2], found[1::2]
+        follows = numbers == (*range(numbers[0], numbers[0] + len(numbers)),)
+        return cls(runs[0], numbers[0], payloads) if follows and len({*runs}) == 1 else None

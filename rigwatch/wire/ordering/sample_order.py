@@ -15,6 +15,7 @@ order is output in the same call; only blocks behind a gap wait.
 from collections import deque
 from typing import Generic
 
+from rigwatch.wire.ordering.numbered import NumberedRun
 from rigwatch.wire.ordering.outcomes import (
     FORGED,
     POSITION_WRONG,
@@ -79,7 +80,7 @@ class SampleOrder(Generic[S]):
 
     def on_block(self, block: S) -> list[Outcome[S]]:
         """Process a block received from the bus."""
-        if self._goes_on(block):
+        if self.goes_on(block):
             return [block]
         if 0 <= block.seq <= LARGEST_SEQ - len(block):
             if len(block):
@@ -88,10 +89,10 @@ class SampleOrder(Generic[S]):
             self.counters.foreign += len(block)
         return self._outcomes()
 
-    def _goes_on(self, block: S) -> bool:
-        """Deliver a block that simply follows the last one, as nearly all do.
+    def goes_on(self, block: S | NumberedRun) -> bool:
+        """Deliver a block that simply follows the last one, as nearly all do; else do nothing.
 
-        What the other steps would do with it, in a quarter of their time.
+        What `on_block` would do with it, in a quarter of its time.
         """
         front, count = self._line[0] if self._line else None, len(block)
         if front is None or block.seq != front.next or block.boot != front.boot or not count:

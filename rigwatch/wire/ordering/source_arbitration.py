@@ -13,7 +13,7 @@ joined no source yet therefore passes over those that send nothing, if another o
 from dataclasses import dataclass
 
 from rigwatch.wire.messages import SampleBlock
-from rigwatch.wire.ordering.numbered import Numbered
+from rigwatch.wire.ordering.numbered import Numbered, NumberedRun
 
 OLD_NS = 5_000_000_000
 """Age of samples, relative to the last, from which a new boot without token is a replay [ns]."""
@@ -174,7 +174,7 @@ class Sources:
             self._rival(block)
         return NO_CHANGE
 
-    def goes_on(self, block: SampleBlock | Numbered) -> bool:
+    def goes_on(self, block: SampleBlock | Numbered | NumberedRun) -> bool:
         """Whether the source in control speaks while no other does, which changes nothing."""
         if not self.is_unrivalled(block.boot):
             return False
@@ -190,7 +190,7 @@ class Sources:
         self._silent = False
         self._latest_ns = t_ns  # the clock may have been set back
 
-    def _hear(self, block: SampleBlock | Numbered) -> None:
+    def _hear(self, block: SampleBlock | Numbered | NumberedRun) -> None:
         self.went_on(int(block.t_ns[-1]))
 
     def _current_spoke(self, block: SampleBlock | Numbered) -> Verdict:

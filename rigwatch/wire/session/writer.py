@@ -19,8 +19,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from mcap.writer import CompressionType, Writer
-
 from rigwatch.version import __version__
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import (
@@ -32,10 +30,10 @@ from rigwatch.wire.messages import (
     encode,
 )
 from rigwatch.wire.messages import protobuf_schema as schema
+from rigwatch.wire.session.chunk_writer import chunk_writer
 from rigwatch.wire.session.chunks import LARGEST_CHUNK
 from rigwatch.wire.session.file_output import FileOutput
 from rigwatch.wire.session.merging import LARGEST_BLOCK, by_chunk, merge_pending
-from rigwatch.wire.session.packed_index import PackedIndex
 
 PROFILE = "rigwatch"
 FORMAT = 1
@@ -46,7 +44,6 @@ SPILL = 2 * LARGEST_BLOCK
 """Most waiting samples before an automatic flush."""
 FULL = LARGEST_CHUNK // 8
 """Size of messages with which a chunk ends: readers refuse one that is far larger [bytes]."""
-_NEVER = 1 << 62
 _CHANNEL_IDS = {line.message: number for number, line in enumerate(TOPICS, start=1)}
 
 
@@ -78,13 +75,7 @@ class SessionWriter:
         self.pending: list[Message] = []
         self._waiting = 0
         self._output = FileOutput(self.path, sync)
-        self._mcap = Writer(
-            self._output,  # type: ignore[arg-type]
-            _NEVER,
-            CompressionType.ZSTD,
-            enable_data_crcs=True,
-        )
-        PackedIndex.put_into(self._mcap)
+        self._mcap = chunk_writer(self._output)
         try:
             self._head(run)
         except SessionError:
