@@ -27,6 +27,7 @@ from monitor.pipeline import compile_together
 from monitor.process.several import Seat, one_turn
 from monitor.process.table import Tables, compile_table
 from rigwatch.recorder.process import Recorder, describe_run
+from rigwatch.wire.bus import Subscription
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.host import Heartbeat
 from rigwatch.wire.messages import ESTIMATES
@@ -72,64 +73,91 @@ def rows_of(rigs: int, cycles: int) -> list[Row]:
 
 def measured(paths: list[Path], cycles: int) -> tuple[float, float, float]:
     """Processor time of a block in daq, in the monitor and in the recorder [µs]."""
-    network = MemoryNetwork()
-    of_daq, links, of_listener, of_recorder = (MemoryLinks(network) for _ in range(4))
-    model = load_model(MODEL)
-    compile_together(model)
-    compile_table(model)
-    join_quickly()
-    lane, lines = Lane(), [Line() for _ in paths]
-    chains = [_chain(path, line, of_daq) for path, line in zip(paths, lines, strict=True)]
-    heard = [of_listener.bus(path.stem, "listener").subscribe(ESTIMATES) for path in paths]
-    seats = [
-        Seat(path, print, lambda config, process: links.bus(config.rig.id, process))
-        for path in paths
-    ]
-    tables = Tables(len(seats))
-
-    def turn() -> None:
-        one_turn(seats, links.together, links.collect, tables)
-
-    def all_run() -> bool:
-        turn()
-        return all(seat.is_running for seat in seats)
-
-    def step() -> None:
-        with of_daq.together():
-            lane.take(chains)
-            for chain in chains:
-                chain.step(0.0)
-
-    def record() -> None:
-        of_recorder.collect()
-        for recorder in recorders:
-            recorder.turn(time.monotonic(), time.time_ns())
-
-    eventually(all_run, "all rigs")
-    recorders = [_recorder(path, of_recorder) for path in paths]
-    counted = 0
+    rigs = Rigs(paths)
     spent: tuple[list[float], list[float], list[float]] = [], [], []
     began = time.monotonic()
     for number, data in enumerate(_readings(WARM_UP + cycles)):
-        for line in lines:
-            line.put(data)
+        rigs.put(data)
         # In real time: the clocks of device and host are compared.
         time.sleep(max(0.0, began + number * BLOCK / RATE - time.monotonic()))
-        spent[0].append(_processor_time(step))
-        spent[1].append(_processor_time(turn))
+        spent[0].append(_processor_time(rigs.acquire))
+        spent[1].append(_processor_time(rigs.judge))
         if number % TURN == 0:
-            spent[2].append(_processor_time(record) / TURN)
-        of_listener.collect()
-        counted += sum(len(block) for one in heard for block in one.drain())
-    assert counted >= len(paths) * cycles * BLOCK, "estimates did not arrive"
-    for seat in seats:
-        seat.close()
-    for recorder in recorders:
-        assert recorder.store.samples >= (cycles - TURN) * BLOCK, "samples were not recorded"
-        recorder.close(time.monotonic(), time.time_ns())
+            spent[2].append(_processor_time(rigs.record) / TURN)
+        rigs.hear()
+    rigs.close(cycles)
     settled = (one[len(one) * WARM_UP // (WARM_UP + cycles) :] for one in spent)
-    daq, monitor, record = (1e6 * float(np.percentile(one, LEAST)) for one in settled)
-    return daq / len(paths), monitor / len(paths), record / len(paths)
+    daq, monitor, recorder = (1e6 * float(np.percentile(one, LEAST)) for one in settled)
+    return daq / len(paths), monitor / len(paths), recorder / len(paths)
+
+
+class Rigs:
+    """Daq, monitor and recorder of several rigs, each as its process has them."""
+
+    def __init__(self, paths: list[Path]) -> None:
+        network, model = MemoryNetwork(), load_model(MODEL)
+        self._daq, self._monitor, self._recorder, self._listener = (
+            MemoryLinks(network) for _ in range(4)
+        )
+        compile_together(model)
+        compile_table(model)
+        join_quickly()
+        self._lane, self._lines = Lane(), [Line() for _ in paths]
+        self._chains = [
+            _chain(path, line, self._daq) for path, line in zip(paths, self._lines, strict=True)
+        ]
+        self._heard, self._samples = [self._estimates(path) for path in paths], 0
+        self._seats = [
+            Seat(path, print, lambda config, process: self._monitor.bus(config.rig.id, process))
+            for path in paths
+        ]
+        self._tables = Tables(len(paths))
+        eventually(self._all_run, "all rigs")
+        self._recorders = [_recorder(path, self._recorder) for path in paths]
+
+    def _estimates(self, path: Path) -> Subscription:
+        return self._listener.bus(path.stem, "listener").subscribe(ESTIMATES)
+
+    def _all_run(self) -> bool:
+        self.judge()
+        return all(seat.is_running for seat in self._seats)
+
+    def put(self, data: bytes) -> None:
+        """What each line brings."""
+        for line in self._lines:
+            line.put(data)
+
+    def acquire(self) -> None:
+        """A cycle of daq."""
+        with self._daq.together():
+            self._lane.take(self._chains)
+            for chain in self._chains:
+                chain.step(0.0)
+
+    def judge(self) -> None:
+        """A turn of the monitor."""
+        one_turn(self._seats, self._monitor.together, self._monitor.collect, self._tables)
+
+    def record(self) -> None:
+        """A turn of the recorders."""
+        self._recorder.collect()
+        for recorder in self._recorders:
+            recorder.turn(time.monotonic(), time.time_ns())
+
+    def hear(self) -> None:
+        """Count the samples whose estimates have come."""
+        self._listener.collect()
+        self._samples += sum(len(block) for one in self._heard for block in one.drain())
+
+    def close(self, cycles: int) -> None:
+        """End, once so many cycles have been judged and recorded."""
+        count = len(self._seats)
+        assert self._samples >= count * cycles * BLOCK, "estimates did not arrive"
+        for seat in self._seats:
+            seat.close()
+        for recorder in self._recorders:
+            assert recorder.store.samples >= (cycles - TURN) * BLOCK, "samples were not recorded"
+            recorder.close(time.monotonic(), time.time_ns())
 
 
 class Line:
