@@ -4,6 +4,7 @@ import csv
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 
 from rigwatch.wire.errors import MissingExtraError, SessionError
 from rigwatch.wire.exchange.session_columns import Array, table_columns
-from rigwatch.wire.messages import Block
+from rigwatch.wire.messages import Block, EstimateBlock, is_of_structure
 from rigwatch.wire.new_file import new_file
 from rigwatch.wire.session import Session
 
@@ -45,7 +46,8 @@ def export_session(
     Args:
         session: the session.
         target: the new file.
-        estimates: the monitor's estimates instead of the samples.
+        estimates: the monitor's estimates instead of the samples; without any, those of a structure
+            that was watched.
         device: name of the device, None if the session has only one.
         start, end: time span [ns].
 
@@ -57,7 +59,7 @@ def export_session(
     if writer is None:
         known = ", ".join(_WRITERS)
         raise SessionError(f"{target}: unknown format {target.suffix!r}, expected one of {known}")
-    deliver = session.estimates if estimates else session.samples
+    deliver = partial(_estimates, session) if estimates else session.samples
     with new_file(target) as part:
         tables = _tables(deliver(device, start, end), session.path)
         first = next(tables, None)
@@ -66,6 +68,15 @@ def export_session(
             raise SessionError(f"{session.path}: found no {kind} to export")
         rows = writer(part, first, tables)
     return Exported(target, rows, tuple(first))
+
+
+def _estimates(
+    session: Session, device: str | None, start: int | None, end: int | None
+) -> Iterator[EstimateBlock]:
+    """The estimates of one process: monitor and structure have other columns."""
+    found = partial(session.estimates, device, start, end)
+    structures = all(map(is_of_structure, found()))
+    return (block for block in found() if is_of_structure(block) == structures)
 
 
 def _tables(found: Iterator[Any], path: Path) -> Tables:

@@ -10,6 +10,7 @@ from rigwatch.browser.rig.live_view import LiveView
 from rigwatch.dashboard.board.facts import Facts
 from rigwatch.recorder.past import BlockStream
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.exchange import export_session
 from rigwatch.wire.messages import ESTIMATES, Column, EstimateBlock, Gap, cut
 from rigwatch.wire.rig_config import WitnessSection
 from rigwatch.wire.session import SessionWriter, open_session, run_info
@@ -62,6 +63,19 @@ def test_a_recording_gives_each_estimate_of_both_once(
         assert numbers(found, name) == list(range(COUNT))
     if flushed > 1:
         assert len(found) == 2, "those of each stand together"
+
+
+@pytest.mark.parametrize(("parts", "columns"), [(slice(None), MONITOR), (slice(1, 2), STRUCTURE)])
+def test_an_export_has_the_estimates_of_one(
+    tmp_path: Path, parts: slice, columns: tuple[str, ...]
+) -> None:
+    said = [estimates(MONITOR, 1.0), estimates(STRUCTURE, 2.0)][parts]
+    with SessionWriter(tmp_path / "both.mcap", run_info("bench", 100.0)) as writer:
+        for block in reversed(said):
+            writer.write(block)
+    made = export_session(open_session(tmp_path / "both.mcap"), tmp_path / "x.csv", estimates=True)
+    assert made.rows == COUNT
+    assert made.columns[-len(columns) :] == tuple(f"{name} []" for name in columns)
 
 
 def test_figures_per_second_are_of_both() -> None:
