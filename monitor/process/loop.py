@@ -135,7 +135,7 @@ class MonitorProcess:
         self._delivered_s = self._estimated_s = 0.0
         self._router_lost_at: float | None = None
         self._recorder: Health | None = None
-        self._unsuitable, self._is_calm = "", False
+        self._unsuitable, self._nothing_held = "", False
         self._standing = self.rig.alarms.standing()
         check = CommandCheck(bus, config.bus.security)
         self._operators = OperatorDesk(bus, check)
@@ -200,7 +200,7 @@ class MonitorProcess:
     @property
     def is_quiet(self) -> bool:
         """Whether the last look around has found nothing that holds, and no ranking is to begin."""
-        return self._is_calm and not self._unsuitable and not self._explainer.waits_for_samples
+        return self._nothing_held and not self._unsuitable and not self._explainer.waits_for_samples
 
     def open_row(self, suits: Callable[[Form], bool]) -> Rested | None:
         """Leave samples to a row of a table, if they simply follow and nothing else happens.
@@ -212,7 +212,7 @@ class MonitorProcess:
             suits: whether blocks of a form can be judged there.
         """
         place = self._last_judged()
-        if not self.is_quiet or place is None:
+        if not self.is_quiet or place is None or not self._time.is_near(*both_clocks()):
             return None
         boot, following = place[0], place[1] + 1
         state = self.rig.at_rest(boot, following)
@@ -251,7 +251,7 @@ class MonitorProcess:
             silent_s: time since the last sample [s].
         """
         return (
-            self._is_calm
+            self._nothing_held
             and silent_s <= self._stale_after
             and not self._health.will_be_due(time.monotonic_ns())
             and self._hears_nothing_new()
@@ -273,7 +273,7 @@ class MonitorProcess:
 
     def look_around(self) -> None:
         """Execute commands, check the link, publish the health."""
-        self._is_calm = False
+        self._nothing_held = False
         now_ns = self._now_ns()
         for announced in self._operators.execute(self.rig.alarms, now_ns, self._last_judged()):
             self.say(announced)
@@ -295,7 +295,7 @@ class MonitorProcess:
         self._announce_clock_step(seen)
         if self._health.is_due(seen.monotonic_ns):
             self._tell_health(seen)
-        self._is_calm = calm and self._router_lost_at is None
+        self._nothing_held = calm and self._router_lost_at is None
 
     def _now_ns(self, sample_ns: int | None = None) -> int:
         """The time by which alarms count [ns]; `sample_ns` is that of a sample that has come."""

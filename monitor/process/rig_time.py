@@ -46,6 +46,10 @@ class RigTime:
         """This time less monotonic time [ns]."""
         return self._offset_ns
 
+    def is_near(self, wall_ns: int, monotonic_ns: int) -> bool:
+        """Whether this time is less than a minute apart from the machine's at a moment."""
+        return abs(wall_ns - monotonic_ns - self._offset_ns) <= APART_NS
+
     def follow(self, offset_ns: int) -> None:
         """The machine's clock has been followed to this offset, of which none was `APART_NS` back,
         by samples none of which was so far ahead.

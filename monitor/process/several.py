@@ -92,7 +92,7 @@ class Seat:
         self._settled = False
         self._look_at = 0.0
         self._table: Table | None = None
-        self._number = 0
+        self._number, self._has_looked = 0, False
         self._connect()
 
     @property
@@ -119,8 +119,13 @@ class Seat:
         return self._table is not None
 
     def enter(self, tables: Tables, number: int) -> None:
-        """Leave to a row what simply follows, if there is nothing else; a failure as in `read`."""
-        if self._process is not None and not self._due:
+        """Leave to a row what simply follows, if there is nothing else; a failure as in `read`.
+
+        That is after a look around: a rig that leaves its row with every block does not come back
+        with every block.
+        """
+        looked, self._has_looked = self._has_looked, False
+        if looked and self._process is not None and not self._due:
             self._number = number
             self._alone(partial(self._enter_table, tables), self._process)
 
@@ -131,9 +136,10 @@ class Seat:
                 self._table = table
 
     def leave_table(self) -> None:
-        """Go on by itself, beginning with a look around; a failure as in `read`."""
-        table, self._table, self._look_at = self._table, None, 0.0
+        """Go on by itself; a failure as in `read`."""
+        table, self._table = self._table, None
         if table is not None and self._process is not None:
+            self._look_at = table.look_at(self._number)
             self._alone(lambda _: table.leave(self._number), self._process)
 
     def see_to(self, left: Left) -> None:
@@ -199,6 +205,7 @@ class Seat:
         if self._settled and now >= self._look_at:
             process.look_around()
             self._look_at, self._pause = now + LOOK_EVERY, FIRST_PAUSE
+            self._has_looked = True
 
     def ready(self) -> Ready | None:
         """The next block, if it can be judged together with those of other rigs."""

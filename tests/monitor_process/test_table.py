@@ -163,7 +163,9 @@ def sent(
 
 
 @pytest.fixture
-def sides(tmp_path: Path) -> Iterator[tuple[Side, Side]]:
+def sides(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Side, Side]]:
+    # A rig comes to its table after a look, and samples come faster than in real time here.
+    monkeypatch.setattr("monitor.process.several.LOOK_EVERY", 0.002)
     made = [
         Side(tmp_path / name, model(), 4, table=table)
         for name, table in (("alone", False), ("table", True))

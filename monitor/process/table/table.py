@@ -352,8 +352,13 @@ class Table:
             for number, silent_s in zip(due.tolist(), silent, strict=True):
                 row = self._rows[number]
                 if row is not None and not (connected and self._is_calm(number, row, silent_s)):
+                    self._look_at[number] = now
                     found.append(number)
         return found
+
+    def look_at(self, number: int) -> float:
+        """Monotonic time of the next look at a rig [s]."""
+        return float(self._look_at[number])
 
     def _is_calm(self, number: int, row: Row, silent_s: float) -> bool:
         try:
