@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigwatch.wire.bus import Bus, sender
+from rigwatch.wire.bus import Bus, complete_subscription, sender
 from rigwatch.wire.bus.alarms.shares import STRANGERS_SHARE
 from rigwatch.wire.bus.complete_subscription import MOST_SENDERS
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
@@ -137,6 +137,38 @@ def test_messages_that_wait_together_are_taken_as_one_by_one(monkeypatch) -> Non
     assert quick.quickly > 1000
     assert quick.of.foreign > 10
     assert quick.of.rejected > 10
+
+
+@pytest.mark.parametrize(
+    ("patient", "expected"),
+    [(False, [0.5, 1.0, 1.5, 2.0, 2.5]), (True, [0.5, 1.5, 3.5, 7.5, 11.5])],
+)
+def test_the_longer_nothing_comes_the_less_often_a_patient_reader_asks(
+    monkeypatch, patient: bool, expected: list[float]
+) -> None:
+    now, asked = 0.0, list[float]()
+    monkeypatch.setattr(complete_subscription.time, "monotonic", lambda: now)
+    network = MemoryNetwork()
+    monitor = network.bus("r", "monitor")
+    monitor.announce()
+    listener = network.bus("r", "listener").listen(ALARMS, patient=patient)
+    listener._took(0.0)
+    (peer,) = listener._senders.values()
+    monkeypatch.setattr(peer, "silent", lambda: asked.append(now) or [])
+
+    def asked_in_silence() -> list[float]:
+        nonlocal now
+        asked.clear()
+        begin = now
+        while len(asked) < len(expected):
+            now += 0.125
+            listener._look_for_more()
+        return [at - begin for at in asked]
+
+    assert asked_in_silence() == expected
+    say(monitor, range(1))
+    listener._took(0.0)
+    assert asked_in_silence() == expected
 
 
 def test_estimates_that_wait_together_are_one_block_up_to_a_gap_and_invalid_ones_are_counted():

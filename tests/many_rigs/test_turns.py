@@ -4,6 +4,7 @@ import contextlib
 import threading
 import time
 from collections import Counter
+from collections.abc import Sequence
 from itertools import pairwise
 
 import pytest
@@ -55,6 +56,39 @@ def test_open_devices_are_read_in_one_thread_and_one_that_ends_or_fails_ends_alo
     again.goes_on = False
     again.thread.join(60.0)
     assert not again.thread.is_alive()
+
+
+def test_what_is_done_with_all_rigs_of_a_part_comes_before_their_steps() -> None:
+    seen: list[list[str]] = []
+    fails = threading.Event()
+
+    def before(subjects: Sequence[str]) -> None:
+        seen.append(sorted(subjects))
+        if fails.is_set():
+            raise OSError("no table")
+
+    turns = Turns(0.001, contextlib.nullcontext, before=before)
+    steps, errors = Counter[str](), list[str]()
+
+    def step(name: str) -> bool:
+        steps[name] += 1
+        return True
+
+    def served(name: str) -> None:
+        try:
+            turns.serve(lambda: step(name), name)
+        except OSError as error:
+            errors.append(f"{name}: {error}")
+
+    rigs = [threading.Thread(target=served, args=[name], daemon=True) for name in "ab"]
+    for rig in rigs:
+        rig.start()
+    eventually(lambda: seen[-1:] == [["a", "b"]] and min(steps["a"], steps["b"]) > 5, "turns")
+    assert len(seen) >= max(steps.values())
+    fails.set()
+    for rig in rigs:
+        rig.join(60.0)
+    assert sorted(errors) == ["a: no table", "b: no table"]
 
 
 class Clock:

@@ -41,6 +41,9 @@ from rigwatch.wire.ordering import (
 
 SILENCE = 0.5
 """Time without a message after which the rings are queried for more [s]."""
+LONGEST_SILENCE = 4.0
+"""The same for a patient reader, whose queries are the rarer the longer nothing comes: what a rig
+rarely says would otherwise be asked for all the time, and each query wakes three processes [s]."""
 MOST_SENDERS = 16
 """Largest number of senders followed; a rig has fewer, so further ones are ignored."""
 RUN_KEPT = 600.0
@@ -60,7 +63,7 @@ class CompleteSubscription(Subscription):
             followed from its first message on. None for messages from now on.
         gaps_in_place: losses are returned among the messages, in their place, not by `reports`.
         publish_gaps: whether losses are published and counted; not if they may still be filled.
-        patient: see `SampleOrder`.
+        patient: see `SampleOrder`; and rings are queried less often while nothing comes.
 
     Attributes:
         lost: messages known to be lost.
@@ -95,7 +98,7 @@ class CompleteSubscription(Subscription):
         self._behind = False
         # The earlier run knew every process of its time.
         self._began_ns = time.time_ns() if resume_after is None else 0
-        self._looked_at = time.monotonic()
+        self._looked_at, self._silence = time.monotonic(), SILENCE
         self._shares = AlarmShares() if topic is ALARMS else None
         self._retold = Retold() if topic is ALARMS else None
         self._questions = RingQuestions(bus, self._answered)
@@ -262,7 +265,7 @@ class CompleteSubscription(Subscription):
         peer = self._senders.get(names[0]) if len(names) == 1 else None
         if run is None or peer is None or not peer.goes_on(run, senders[0]):
             return False
-        self._looked_at = time.monotonic()
+        self._heard()
         self._ready += payloads
         return True
 
@@ -381,8 +384,10 @@ class CompleteSubscription(Subscription):
 
     def _look_for_more(self) -> None:
         now = time.monotonic()
-        if now - self._looked_at >= SILENCE:
+        if now - self._looked_at >= self._silence:
             self._looked_at = now
+            if self._patient:
+                self._silence = min(2.0 * self._silence, LONGEST_SILENCE)
             for process, peer in self._senders.items():
                 self._handle(process, peer.silent())
 
@@ -397,8 +402,12 @@ class CompleteSubscription(Subscription):
             elif outcome.severity == "error":
                 self._remark(process, outcome)
 
+    def _heard(self) -> None:
+        """The next look for more is after a short silence."""
+        self._looked_at, self._silence = time.monotonic(), SILENCE
+
     def _deliver(self, process: str, message: Numbered) -> None:
-        self._looked_at = time.monotonic()
+        self._heard()
         if self._shares is None or self._shares.admits(process, message.payload):
             if self._retold is None or not self._retold.is_repeat(process, message):
                 self._ready.append(message.payload)
