@@ -33,7 +33,7 @@ from rigwatch.wire.host import Heartbeat
 from rigwatch.wire.messages import ESTIMATES
 from rigwatch.wire.quick_joining import join_quickly
 from rigwatch.wire.rig_config import load_rig
-from tests.many_rigs.memory_links import MemoryLinks
+from tests.many_rigs.rows.memory_links import MemoryLinks
 from tests.waiting import eventually
 from tools.benchmark_table import Row
 

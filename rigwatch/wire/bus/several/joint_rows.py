@@ -19,9 +19,9 @@ import numpy as np
 from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
 from rigwatch.wire.bus.several.joint_message import Part, split
 from rigwatch.wire.kernel import kernel, part
-from rigwatch.wire.messages import ByteArray
-from rigwatch.wire.messages.rows import (
+from rigwatch.wire.messages import (
     MOST_FORMS,
+    ByteArray,
     Form,
     Forms,
     form_of,

@@ -16,12 +16,12 @@ from rigwatch.wire.bus.several.joint_message import MOST_PARTS
 from rigwatch.wire.bus.several.joint_rows import LONGEST_ID
 from rigwatch.wire.bus.several.joint_sender import LARGEST
 from rigwatch.wire.kernel import kernel, part
-from rigwatch.wire.messages import ByteArray
-from rigwatch.wire.messages.rows import (
+from rigwatch.wire.messages import (
     LONGEST_HEAD,
+    ByteArray,
     EstimateHeads,
     Heads,
-    block_size,
+    estimate_size,
     source_head,
     write_block,
 )
@@ -187,5 +187,5 @@ def _write(  # noqa: PLR0917
 def _part_size(blocks: Blocks, k: int, senders: Senders, heads: Heads) -> int:
     """Size of a part without its lengths [bytes]."""
     row = blocks.rows[k]
-    size = block_size(heads, senders.source_size[row], blocks.first[k], blocks.samples[k])
+    size = estimate_size(heads, senders.source_size[row], blocks.first[k], blocks.samples[k])
     return senders.id_size[row] + _MARK + size

@@ -7,7 +7,15 @@ A form and heads are made by the one encoding there is (`packed`, `packed_encodi
 are the same; what a form does not fit is left to it.
 """
 
-from rigwatch.wire.messages.rows.reading import (
+from rigwatch.wire.messages.rows.estimate_rows import (
+    LONGEST_HEAD,
+    EstimateHeads,
+    Heads,
+    estimate_size,
+    source_head,
+    write_block,
+)
+from rigwatch.wire.messages.rows.sample_rows import (
     LONGEST_BLOCK,
     MOST_COLUMNS,
     MOST_FORMS,
@@ -18,14 +26,6 @@ from rigwatch.wire.messages.rows.reading import (
     new_forms,
     read_block,
     store_form,
-)
-from rigwatch.wire.messages.rows.writing import (
-    LONGEST_HEAD,
-    EstimateHeads,
-    Heads,
-    block_size,
-    source_head,
-    write_block,
 )
 
 __all__ = [
@@ -38,7 +38,7 @@ __all__ = [
     "Form",
     "Forms",
     "Heads",
-    "block_size",
+    "estimate_size",
     "form_of",
     "new_forms",
     "read_block",

@@ -69,7 +69,7 @@ def source_head(device: str, boot: int) -> bytes:
 
 
 @part()
-def block_size(heads: Heads, source: int, seq: int, n: int) -> int:
+def estimate_size(heads: Heads, source: int, seq: int, n: int) -> int:
     """Size of a block of n samples [bytes], `source` of which are its device and boot."""
     columns = heads.ends.shape[1]
     number = _number_size(seq) + 1 if seq != 0 else 0

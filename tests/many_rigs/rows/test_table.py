@@ -26,7 +26,7 @@ from rigwatch.wire.messages import (
 )
 from rigwatch.wire.messages import quality_flags as quality
 from tests.bus.rig import TestRig
-from tests.many_rigs.memory_links import MemoryLinks
+from tests.many_rigs.rows.memory_links import MemoryLinks
 from tests.monitor.monitor_rig import OTHER_SINE, SINE, block, friction, model, run
 from tests.waiting import PATIENCE, eventually, wait_until
 
