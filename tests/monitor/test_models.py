@@ -11,7 +11,15 @@ from scipy.stats import chi2
 from monitor.commissioning.commission import commission
 from monitor.commissioning.friction_filter import fit_friction_filter
 from monitor.decision.decision_rules import chance_a_look, rules_for
-from monitor.model import model_versions
+from monitor.model import (
+    EquationsPlant,
+    FrictionSection,
+    HealthyLimits,
+    NoiseSection,
+    RangeSection,
+    RemainderSection,
+    model_versions,
+)
 from monitor.model.model_file import RigModel, load_model, model_text
 from monitor.pipeline.pipeline import Monitor
 from monitor.signals.inertia import commission_inertia, kernels
@@ -51,6 +59,43 @@ def test_commissioning_finds_the_rig() -> None:
 )
 def test_a_wrong_model_file_is_reported(tmp_path: Path, old: str, new: str, says: str) -> None:
     path = saved(model(), tmp_path)
+    path.write_text(path.read_text().replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(ConfigError, match=says):
+        load_model(path)
+
+
+def of_equations() -> RigModel:
+    return RigModel(
+        sample_rate=RATE,
+        channels=("drive", "place", "acceleration"),
+        plant=EquationsPlant(model="mass-spring-damper", names=("m",), values=(0.5,), port="force"),
+        friction=FrictionSection(b=(1.0,), a=(1.0,), gamma=0.0),
+        noise=NoiseSection(residual=0.1),
+        remainder=RemainderSection(
+            centre=(0.0, 0.0), scale=(1.0, 1.0), weights=(0.1, 0.2, 0.3, 0.4, 0.5)
+        ),
+        motion_range=RangeSection(names=("drive", "v"), low=(-3.0, -4.0), high=(3.0, 4.0)),
+        healthy=HealthyLimits(
+            noise=0.1, growth=(0.1,), short=1.0, medium=1.0, friction=1.0, sensor_noise=0.1,
+            sensor_growth=0.1, sensor=1.0, speed_noise=1e-3,
+        ),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("[0.1, 0.2, 0.3, 0.4, 0.5]", "[0.1, 0.2, 0.3, 0.4]", r"remainder\.weights.*4.*5"),
+        ("scale = [1.0, 1.0]", "scale = [1.0]", r"remainder\.scale.*1.*2"),
+        ("low = [-3.0, -4.0]", "low = [-3.0]", r"motion_range\.low.*1.*2"),
+        ("high = [3.0, 4.0]", "high = [3.0, 4.0, 5.0]", r"motion_range\.high.*3.*2"),
+    ],
+)
+def test_values_that_are_missing_from_a_model_of_equations_are_reported(
+    tmp_path: Path, old: str, new: str, says: str
+) -> None:
+    path = saved(of_equations(), tmp_path)
+    assert load_model(path) == of_equations()
     path.write_text(path.read_text().replace(old, new, 1), encoding="utf-8")
     with pytest.raises(ConfigError, match=says):
         load_model(path)
