@@ -72,12 +72,14 @@ def check_healthy(names: Sequence[str], judged: Sequence[FloatArray], rate: floa
     Raises:
         ModelError: friction sets in within a recording, or one recording has more than the others.
     """
-    blocks = [_blocks(one) for one in judged]
-    for name, one in zip(names, blocks, strict=True):
-        _check_onset(name, one, rate)
-    if len(blocks) >= LEAST:
-        for k, name in enumerate(names):
-            _check_against_others(name, blocks[k], blocks[:k] + blocks[k + 1 :])
+    every = [(name, _blocks(one)) for name, one in zip(names, judged, strict=True)]
+    # One that ends before a block is whole has no estimate, and tells nothing of the others.
+    known = [(name, blocks) for name, blocks in every if blocks.size]
+    for name, blocks in known:
+        _check_onset(name, blocks, rate)
+    if len(known) >= LEAST:
+        for k, (name, blocks) in enumerate(known):
+            _check_against_others(name, blocks, [b for _, b in known[:k] + known[k + 1 :]])
 
 
 def _blocks(judged: FloatArray) -> FloatArray:

@@ -261,6 +261,18 @@ def _check_equations(model: RigModel, path: Path | str) -> None:
     if model.promoted or model.band:
         key = "promoted" if model.promoted else "band"
         raise ConfigError(path, key, "this section", "none for a plant of equations")
+    assert model.remainder is not None
+    assert model.motion_range is not None
+    # Compiled loops read as many values as they expect, whether or not there are as many.
+    signals, names = len(model.remainder.centre), len(model.motion_range.names)
+    for key, values, expected in (
+        ("remainder.scale", model.remainder.scale, signals),
+        ("remainder.weights", model.remainder.weights, signals + signals * (signals + 1) // 2),
+        ("motion_range.low", model.motion_range.low, names),
+        ("motion_range.high", model.motion_range.high, names),
+    ):
+        if len(values) != expected:
+            raise ConfigError(path, key, f"{len(values)} values", f"{expected} values")
 
 
 _COLUMNS = ("voltage", "position", "acceleration", "modelled")

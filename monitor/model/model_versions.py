@@ -10,9 +10,10 @@ import contextlib
 import glob
 import hashlib
 import json
+import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import cast
+from typing import BinaryIO, cast
 
 import msgspec
 
@@ -84,11 +85,13 @@ def install(path: Path, text: str, t_ns: int, author: Author, step: str = "promo
         ConfigError: a file cannot be written.
     """
     try:
-        if path.exists():
-            number = max(_numbers(path), default=0) + 1
-            replace_file(_version(path, number), path.read_bytes())
-        replace_file(path, text)
-        _note(path, step, text, t_ns, author)
+        # Opened first: nothing changes if its line could not be written.
+        with _history(path).open("a+b") as lines:
+            if path.exists():
+                number = max(_numbers(path), default=0) + 1
+                replace_file(_version(path, number), path.read_bytes())
+            replace_file(path, text)
+            _note(lines, step, text, t_ns, author)
     except OSError as error:
         raise ConfigError(path, "", reason_of(error), "a file to write") from error
 
@@ -102,10 +105,13 @@ def rewrite(path: Path, text: str, t_ns: int) -> None:
     now = digest_of(path)
     line = next((one for one in reversed(history(path)) if one.sha256 == now), None)
     try:
-        replace_file(path, text)
-        if line is not None:
+        if line is None:
+            replace_file(path, text)
+            return
+        with _history(path).open("a+b") as lines:
+            replace_file(path, text)
             author = Author(line.user, line.why, cast("Identity", line.identity or NOT_PROVED))
-            _note(path, line.step, text, t_ns, author)
+            _note(lines, line.step, text, t_ns, author)
     except OSError as error:
         raise ConfigError(path, "", reason_of(error), "a file to write") from error
 
@@ -137,11 +143,12 @@ def roll_back(path: Path, t_ns: int, author: Author) -> str:
     """
     text = version_before(path)
     try:
-        undone = path.read_text(encoding="utf-8")
-        replace_file(path.with_name(f"{path.stem}.undone-{_sha256(undone)[:8]}.toml"), undone)
-        replace_file(path, text)
-        newest_before(path).unlink()
-        _note(path, "rollback", text, t_ns, author)
+        with _history(path).open("a+b") as lines:
+            undone = path.read_text(encoding="utf-8")
+            replace_file(path.with_name(f"{path.stem}.undone-{_sha256(undone)[:8]}.toml"), undone)
+            replace_file(path, text)
+            newest_before(path).unlink()
+            _note(lines, "rollback", text, t_ns, author)
     except OSError as error:
         raise ConfigError(path, "", reason_of(error), "a file to write") from error
     return text
@@ -159,10 +166,13 @@ def _version(path: Path, number: int) -> Path:
     return path.with_name(f"{path.stem}.v{number}.toml")
 
 
-def _note(path: Path, step: str, text: str, t_ns: int, author: Author) -> None:
+def _note(lines: BinaryIO, step: str, text: str, t_ns: int, author: Author) -> None:
+    """Append a line to the history, a new one even where a kill has left an incomplete one."""
     line = {"t_ns": t_ns, "step": step, **asdict(author), "sha256": _sha256(text)}
-    with _history(path).open("a", encoding="utf-8") as file:
-        file.write(json.dumps(line, ensure_ascii=False) + "\n")
+    size = lines.seek(0, os.SEEK_END)
+    lines.seek(max(size - 1, 0))
+    torn = b"" if lines.read(1) in (b"", b"\n") else b"\n"
+    lines.write(torn + json.dumps(line, ensure_ascii=False).encode() + b"\n")
 
 
 def _history(path: Path) -> Path:

@@ -11,6 +11,15 @@ from scipy.stats import chi2
 from monitor.commissioning.commission import commission
 from monitor.commissioning.friction_filter import fit_friction_filter
 from monitor.decision.decision_rules import chance_a_look, rules_for
+from monitor.model import (
+    EquationsPlant,
+    FrictionSection,
+    HealthyLimits,
+    NoiseSection,
+    RangeSection,
+    RemainderSection,
+    model_versions,
+)
 from monitor.model.model_file import RigModel, load_model, model_text
 from monitor.pipeline.pipeline import Monitor
 from monitor.signals.inertia import commission_inertia, kernels
@@ -53,6 +62,68 @@ def test_a_wrong_model_file_is_reported(tmp_path: Path, old: str, new: str, says
     path.write_text(path.read_text().replace(old, new, 1), encoding="utf-8")
     with pytest.raises(ConfigError, match=says):
         load_model(path)
+
+
+def of_equations() -> RigModel:
+    return RigModel(
+        sample_rate=RATE,
+        channels=("drive", "place", "acceleration"),
+        plant=EquationsPlant(model="mass-spring-damper", names=("m",), values=(0.5,), port="force"),
+        friction=FrictionSection(b=(1.0,), a=(1.0,), gamma=0.0),
+        noise=NoiseSection(residual=0.1),
+        remainder=RemainderSection(
+            centre=(0.0, 0.0), scale=(1.0, 1.0), weights=(0.1, 0.2, 0.3, 0.4, 0.5)
+        ),
+        motion_range=RangeSection(names=("drive", "v"), low=(-3.0, -4.0), high=(3.0, 4.0)),
+        healthy=HealthyLimits(
+            noise=0.1, growth=(0.1,), short=1.0, medium=1.0, friction=1.0, sensor_noise=0.1,
+            sensor_growth=0.1, sensor=1.0, speed_noise=1e-3,
+        ),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("[0.1, 0.2, 0.3, 0.4, 0.5]", "[0.1, 0.2, 0.3, 0.4]", r"remainder\.weights.*4.*5"),
+        ("scale = [1.0, 1.0]", "scale = [1.0]", r"remainder\.scale.*1.*2"),
+        ("low = [-3.0, -4.0]", "low = [-3.0]", r"motion_range\.low.*1.*2"),
+        ("high = [3.0, 4.0]", "high = [3.0, 4.0, 5.0]", r"motion_range\.high.*3.*2"),
+    ],
+)
+def test_values_that_are_missing_from_a_model_of_equations_are_reported(
+    tmp_path: Path, old: str, new: str, says: str
+) -> None:
+    path = saved(of_equations(), tmp_path)
+    assert load_model(path) == of_equations()
+    path.write_text(path.read_text().replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(ConfigError, match=says):
+        load_model(path)
+
+
+def test_a_line_of_the_history_that_a_kill_has_torn_takes_no_later_one_with_it(
+    tmp_path: Path,
+) -> None:
+    path, author = tmp_path / "model.toml", model_versions.Author("ann", "why")
+    model_versions.install(path, "first", 1, author)
+    with (tmp_path / "model.history.jsonl").open("ab") as lines:
+        lines.write(b'{"t_ns": 2, "step": "prom')
+    model_versions.install(path, "second", 3, author)
+    model_versions.roll_back(path, 4, author)
+    assert [line.t_ns for line in model_versions.history(path)] == [1, 3, 4]
+
+
+def test_a_change_that_the_history_cannot_take_changes_nothing(tmp_path: Path) -> None:
+    path, author = tmp_path / "model.toml", model_versions.Author("ann", "why")
+    path.write_text("now", encoding="utf-8")
+    (tmp_path / "model.v1.toml").write_text("before", encoding="utf-8")
+    (tmp_path / "model.history.jsonl").mkdir()
+    with pytest.raises(ConfigError):
+        model_versions.install(path, "new", 1, author)
+    with pytest.raises(ConfigError):
+        model_versions.roll_back(path, 2, author)
+    kept = {file.name: file.read_text() for file in tmp_path.glob("*.toml")}
+    assert kept == {"model.toml": "now", "model.v1.toml": "before"}
 
 
 def test_a_missing_recording_is_reported() -> None:

@@ -34,6 +34,14 @@ def test_more_friction_in_one_recording_is_reported_and_equal_friction_in_all_is
         check_healthy(["a", "b", "c"], [part(1), part(2), part(3, 0.5)], RATE)
 
 
+def test_a_recording_too_short_for_an_estimate_leaves_the_others_judged() -> None:
+    # Five seconds at 100 Hz, of which nothing is left once it has settled.
+    brief = part(4)[:500]
+    with pytest.raises(ModelError, match=r"c: found about 0\.5.* more friction than"):
+        check_healthy(["a", "b", "c", "d"], [part(1), brief, part(3, 0.5), part(2)], 100.0)
+    check_healthy(["a", "b", "c", "d"], [part(1), brief, part(2), part(3)], 100.0)
+
+
 def test_a_short_recording_is_refused_with_what_to_do() -> None:
     moving = recording_of("healthy", "brief", RATE, {"position": np.sin(np.arange(512) / 5.0)})
 
