@@ -78,6 +78,27 @@ def test_a_direction_is_the_derivative_of_the_composed_model(name, port):
     assert wrong <= 2e-2 * np.sqrt(np.mean(expected**2))
 
 
+@pytest.mark.parametrize("name", ["coulomb_running_in", "jenkins"])
+def test_what_an_effect_remembers_is_of_its_own_recording(name):
+    effect, u = ready(name), excitation()[:768]
+    shape = {n: p.value for n, p in effect.parameters.items() if n != effect.strength}
+    bare, length, windows_of_each = compile_system(compose(MODEL)), 128, 3
+    begins = np.repeat([0, 384], 384)
+    first = np.random.default_rng(3).normal(size=(2 * windows_of_each, 2)) * (0.03, 0.5)
+
+    def moved(signal, initial, began):
+        starts = np.arange(0, len(signal), length)
+        values = bare.vector(TRUE)
+        at = trajectory(
+            bare, signal, DT, starts, length, initial=initial, parameters=values, begins=began
+        )
+        return directions(at, [Candidate(name, effect, "load", shape)])[..., 0]
+
+    together = moved(u, first, begins)
+    second = moved(u[384:], first[windows_of_each:], np.zeros(384, np.int64))
+    assert np.allclose(together[windows_of_each:], second, rtol=1e-9, atol=1e-15)
+
+
 @pytest.mark.kernels
 def test_the_hidden_effect_ranks_first():
     friction = Placement("coulomb", library()["coulomb"], "load")

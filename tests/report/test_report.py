@@ -12,11 +12,12 @@ import pytest
 from rigwatch.commands import main
 from rigwatch.page.scale import Scale, limits
 from rigwatch.page.svg import Plot
+from rigwatch.workbench.compare import Region
 from rigwatch.workbench.explain.verdict_calibration import LATER_COUNTS, later_probability_wrong
 from rigwatch.workbench.fit import Value
 from rigwatch.workbench.report import explanation_lines, next_command, next_step
 from rigwatch.workbench.report.html_report import gather, report_html
-from rigwatch.workbench.report.sections import headline
+from rigwatch.workbench.report.sections import headline, shown_at
 from rigwatch.workbench.report.text_report import doubt_of
 from rigwatch.workbench.study.study import Study
 from tests.report.style import COLOURS, WORDS
@@ -246,3 +247,15 @@ def test_a_line_breaks_where_nothing_was_measured_and_keeps_its_peaks() -> None:
     assert len(path[1]) < 20_000
     highest = min(float(pair.split()[1]) for pair in re.findall(r"[\d.]+ [\d.]+", path[1]))
     assert highest == pytest.approx(plot.up.at(7.0), abs=0.06)
+
+
+def test_pieces_of_recordings_with_numbers_in_their_names_stand_as_recorded() -> None:
+    names = [
+        f"{run}.mcap, {ends} s" for run in ("20_run", "3 runs") for ends in ("0 to 5", "5 to 9")
+    ]
+    regions = [
+        Region("time", name, "y", 1.0, 0.0, 0.1, 1.0, np.arange(100 * k, 100 * k + 100))
+        for k, name in enumerate(names)
+    ]
+    by_energy = regions[::-1]
+    assert [region.name for region in sorted(by_energy, key=shown_at)] == names

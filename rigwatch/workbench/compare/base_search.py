@@ -111,4 +111,8 @@ def _cut(whole: Recording, begin: int, end: int | None, parts: tuple[int, ...]) 
     own = whole.own_spacings[: len(parts)] if begin == 0 else whole.own_spacings[-len(parts) :]
     dt, spacings = of_parts(own, parts)
     inputs, outputs = whole.inputs[begin:end], whole.outputs[begin:end]
-    return Recording(dt, inputs, outputs, thinning, parts, spacings=spacings)
+    breaks = tuple(at - begin for at in whole.breaks if 0 <= at - begin < len(inputs))
+    return replace(
+        whole, dt=dt, inputs=inputs, outputs=outputs, thinning=thinning, parts=parts, breaks=breaks,
+        spacings=spacings,
+    )  # fmt: skip

@@ -15,6 +15,7 @@ from rigwatch.workbench.data import (
     along_motion,
     expected_error,
     held_out_floor,
+    learns_from_healthy,
     overstated,
     predicts_along_motion,
     prepare,
@@ -27,7 +28,6 @@ from rigwatch.workbench.fit import (
     fit_base,
     fit_model,
     keeps_accepted,
-    learns_from_healthy,
     only_noise_left,
     poorly_determined,
     with_healthy_parameters,
@@ -146,5 +146,9 @@ def _of_healthy(study: Study, data: Data, healthy: Data, base: Fitted, bare: Fit
     held_out = min(fits, key=lambda fitted: fitted.train_error).held_out
     if not healthy.along_motion:
         return NoiseFloor(held_out.rms, "healthy")
-    own = expected_error(held_out.residuals, healthy.held_out.outputs, data.held_out.outputs)
+    thinning = healthy.held_out.thinning
+    own = expected_error(
+        held_out.residuals, healthy.held_out.outputs, data.held_out.outputs,
+        thinning.factor if thinning else 1,
+    )  # fmt: skip
     return NoiseFloor(held_out.rms, "healthy motion", own_error=own)

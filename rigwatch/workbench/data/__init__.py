@@ -17,7 +17,11 @@ from rigwatch.workbench.data.noise import (
 )
 from rigwatch.workbench.data.one_rate import ALIKE as RATES_ALIKE
 from rigwatch.workbench.data.one_rate import RESAMPLED
-from rigwatch.workbench.data.prediction import form_along_motion, predicts_along_motion
+from rigwatch.workbench.data.prediction import (
+    form_along_motion,
+    learns_from_healthy,
+    predicts_along_motion,
+)
 from rigwatch.workbench.data.proposals import (
     Part,
     proposed_low_pass,
@@ -47,6 +51,7 @@ __all__ = [
     "form_along_motion",
     "from_residual",
     "held_out_floor",
+    "learns_from_healthy",
     "lowered",
     "overstated",
     "parameters_of",

@@ -28,6 +28,7 @@ from rigwatch.physics.engine.fit import (
 )
 from rigwatch.physics.transfer import SensorPhase
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data.prediction import form_along_motion
 from rigwatch.workbench.data.signals import Data, MotionSensor
 from rigwatch.workbench.study import Study
@@ -49,6 +50,10 @@ UNCHECKED = (
     "no healthy recording: the model cannot be checked; record one with nothing wrong and list it"
     " under [[healthy]]"
 )
+NONE_COUNTS = (
+    "found no sample that counts along the measured motion, expected one that moves: those near"
+    " standstill do not count, nor those in which hidden states settle"
+)
 RANGE_RATIO = 1.2
 """Ratio of motion ranges above which a recording is reported to exceed the healthy one."""
 LATE = (
@@ -65,7 +70,8 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
         data: its recordings, for the unmodified model.
 
     Raises:
-        ModelError: no channel measures any of the model's states, or no output is left to predict.
+        ModelError: no channel measures any of the model's states, no output is left to predict, or
+            no sample of a recording counts.
     """
     model = along_measured_motion(unmoved_at_rest(study.model))
     # One width for all recordings: the smoothing is part of the fitted model.
@@ -86,6 +92,9 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
 
     healthy = made(data.healthy) if data.healthy is not None else None
     train, held_out = made(data.train), made(data.held_out)
+    for use, recording in (("train", train), ("healthy", healthy)):
+        if recording is not None and not np.isfinite(recording.outputs).any(axis=0).all():
+            raise ModelError(f"{use}: {NONE_COUNTS}")
     openings = made(data.openings) if data.openings is not None else None
     longest = max(len(r) for r in (train, held_out, healthy) if r is not None)
     form = form_along_motion(study.model)

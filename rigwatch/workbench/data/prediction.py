@@ -25,6 +25,13 @@ def predicts_along_motion(study: Study) -> bool:
     return not unjudged_along_motion(model)
 
 
+def learns_from_healthy(study: Study) -> bool:
+    """Whether a study's model is rough and extended by terms learned along the measured motion."""
+    if study.file.prediction != "auto":
+        return False
+    return study.model.rough and has_hidden_states(study.model)
+
+
 def form_along_motion(model: Model) -> str:
     """What drives a model along its measured motion and what is simulated, in words."""
     shown = [state.name for state in measured_states(model)]

@@ -2,7 +2,7 @@
 
 Invalid and lost samples are NaN. Inputs are interpolated linearly there, since a simulation needs
 them everywhere; outputs that are simulated from such an input, up to the end of the window, do not
-count.
+count. Along the measured motion there are no windows, and those outputs are the motion.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigwatch.physics.engine.equations import Input, Model, Output
-from rigwatch.physics.engine.fit import Recording, Thinning, of_parts
+from rigwatch.physics.engine.fit import Recording, Thinning, ends_of_holes, of_parts
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError, nearest
 from rigwatch.workbench.data.columns import Columns, any_same, bridged
@@ -19,12 +19,11 @@ from rigwatch.workbench.data.derived_ends import without_ends
 from rigwatch.workbench.data.next_rows import with_next_rows
 from rigwatch.workbench.data.one_rate import at_own_rates, on_one_rate
 from rigwatch.workbench.data.openings import without_openings
-from rigwatch.workbench.data.prediction import predicts_along_motion
+from rigwatch.workbench.data.prediction import learns_from_healthy, predicts_along_motion
 from rigwatch.workbench.data.recorded_columns import read_columns, with_derived
 from rigwatch.workbench.data.signal_units import check_unit
 from rigwatch.workbench.data.whole_windows import (
     counted_length,
-    ends_of_holes,
     last_values,
     of_length,
 )
@@ -237,7 +236,7 @@ def _recording(
     thinning = Thinning(thin.factor, thin.edge, parts) if thin else None
     u, y = np.concatenate(inputs), np.concatenate(outputs)
     breaks = ends_of_holes(u)
-    u, y = _without_holes(study.model, u, y, horizon, use=use, remarks=remarks)
+    u, y = _without_holes(study, u, y, horizon, use=use, remarks=remarks)
     if use != "openings":
         _check_excitation(study.model, u, use)
     ends = [name for name, held in study.holds.items() if held.ends]
@@ -282,9 +281,10 @@ def _matched(study: Study, table: Columns) -> tuple[FloatArray, FloatArray]:
 
 
 def _without_holes(
-    model: Model, u: FloatArray, y: FloatArray, horizon: int, *, use: str, remarks: list[str]
+    study: Study, u: FloatArray, y: FloatArray, horizon: int, *, use: str, remarks: list[str]
 ) -> tuple[FloatArray, FloatArray]:
     """Inputs without gaps, and outputs without those that are simulated from an invented input."""
+    model = study.model
     missing = np.asarray(~np.isfinite(u).all(axis=1))
     for index, name in enumerate(model.inputs):
         share = float(np.mean(~np.isfinite(u[:, index])))
@@ -298,7 +298,9 @@ def _without_holes(
             raise ModelError(f"{use}: found no valid sample of output {name!r}")
     if not missing.any():
         return u, y
-    lost = _to_the_windows_end(missing, horizon) if model.states else missing
+    driven = predicts_along_motion(study) or learns_from_healthy(study)
+    runs_on = bool(model.states) and not driven
+    lost = _to_the_windows_end(missing, horizon) if runs_on else missing
     remark = f"{use}: {int(missing.sum())} samples {INVENTED} are not counted"
     if after := int(lost.sum() - missing.sum()):
         remark += f", nor {after} that the model runs through before its next initialisation"

@@ -1,4 +1,4 @@
-"""Recordings in whole windows: their ends, and what follows a time of unknown inputs.
+"""Recordings in whole windows: their ends.
 
 A recording seldom ends where a window does. If at least half of the last window is recorded, and
 the study says so, it counts: the inputs stay at their last values until its end, where no output
@@ -14,8 +14,6 @@ from rigwatch.workbench.study import Study
 
 LEAST = 0.5
 """Share of the last window that must be recorded."""
-LONG_HOLE = 3
-"""Samples without a valid input, one after the other, from which hidden states begin anew."""
 
 
 def counted_length(study: Study, samples: int, horizon: int) -> int:
@@ -47,14 +45,3 @@ def last_values(signals: FloatArray) -> FloatArray:
     """The last valid value of each signal, NaN if it has none; shape (signals,)."""
     valid = [column[np.isfinite(column)] for column in signals.T]
     return np.array([column[-1] if len(column) else np.nan for column in valid])
-
-
-def ends_of_holes(inputs: FloatArray) -> tuple[int, ...]:
-    """First samples after long holes in the inputs, through which no state can be followed.
-
-    Args:
-        inputs: shape (n, inputs), NaN without a valid sample.
-    """
-    missing = np.concatenate([[False], ~np.isfinite(inputs).all(axis=1), [False]])
-    begins, ends = np.flatnonzero(np.diff(missing)).reshape(-1, 2).T
-    return tuple(ends[ends - begins >= LONG_HOLE].tolist())

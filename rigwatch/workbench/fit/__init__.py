@@ -27,7 +27,7 @@ from rigwatch.workbench.fit.healthy_parameters import (
     with_values,
 )
 from rigwatch.workbench.fit.healthy_reference import with_healthy_reference
-from rigwatch.workbench.fit.healthy_remainder import learns_from_healthy, with_healthy_remainder
+from rigwatch.workbench.fit.healthy_remainder import with_healthy_remainder
 from rigwatch.workbench.fit.input_hold import (
     explains_more,
     held_as,
@@ -76,7 +76,6 @@ __all__ = [
     "held_as",
     "interval_with_held",
     "keeps_accepted",
-    "learns_from_healthy",
     "may_be_local_minimum",
     "may_hide_slow",
     "nodes",

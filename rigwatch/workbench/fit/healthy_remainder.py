@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from msgspec import structs
 
-from rigwatch.physics.engine.equations import Model, has_hidden_states
+from rigwatch.physics.engine.equations import Model
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, along_motion, repeat_of
 from rigwatch.workbench.fit.fitted import Fitted
@@ -29,13 +29,6 @@ LONGER = 4
 need to settle only once."""
 SUBSTEPS = 4
 """Integration steps per sample: the hidden states are as fast as a valve."""
-
-
-def learns_from_healthy(study: Study) -> bool:
-    """Whether a study's model is rough and extended by terms learned along the measured motion."""
-    if study.file.prediction != "auto":
-        return False
-    return study.model.rough and has_hidden_states(study.model)
 
 
 def with_healthy_remainder(study: Study, data: Data) -> tuple[Study, Data]:

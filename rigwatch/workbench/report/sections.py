@@ -172,12 +172,15 @@ def _bars(m: Material, channel: str, unit: str, *, wide: bool) -> dict[str, str]
         old, new = ([r for r in found if (r.channel, r.view) == (channel, view)]
                     for found in (m.before, m.now))  # fmt: skip
         if old and wide == (len(old) > charts.NARROW):
-            ordered = sorted(old, key=_order)
+            ordered = sorted(old, key=shown_at)
             drawn[f"By {words}"] = charts.bars_chart(ordered, new, floor, words, unit)
     return drawn
 
 
-def _order(region: Region) -> tuple[float, str]:
+def shown_at(region: Region) -> tuple[float, str]:
+    """Pieces of time as they were recorded, distances by their size, directions by their name."""
+    if region.view == "time":
+        return float(region.samples[0]), ""
     words = [w for w in region.name.replace("|x - mean|", "").split() if w[0].isdigit()]
     return (float(words[0]) if words else 0.0), region.name
 

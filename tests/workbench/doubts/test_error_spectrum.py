@@ -46,6 +46,19 @@ def test_the_same_error_where_the_healthy_motion_checks_the_model_is_not() -> No
     assert expected().beyond(left[None], RMS) > 15
 
 
+def test_the_bands_of_a_thinned_error_are_those_of_the_motion_at_these_frequencies() -> None:
+    # Four samples of the motion to one of the error: a band of it lies four times as low there.
+    slow, fast = ((low / 4, high / 4) for low, high in (SLOW, FAST))
+    healthy = noise(1.0, *slow) + noise(0.05, *fast)
+    cornered = noise(1.0, *slow) + noise(0.3, *fast)
+    healthy, cornered = (np.tile(each, (3, 1)) for each in (healthy, cornered))
+    found = expected_error(ERROR[None], healthy, cornered, 4)
+    assert found is not None
+    own = noise(0.01, *SLOW) + noise(0.15, *FAST)
+
+    assert found.beyond(own[None], RMS) < 0.15 * (own.std() / RMS[0]) ** 2
+
+
 def test_samples_that_do_not_count_hold_nothing() -> None:
     left = noise(0.01, *SLOW)
     left[1000:1010] += 3.0

@@ -143,7 +143,7 @@ def test_repeats_count_from_the_second_step_on_for_outputs_that_follow_at_once(
 
 
 def repeated(
-    levels: tuple[float, ...], step: float = 0.0, periods: tuple[int, ...] = (100,) * 3
+    levels: tuple[float, ...], step: float = 0.0, periods: tuple[float, ...] = (100,) * 3
 ) -> tuple[Fit, Recording]:
     """A tone that repeats after 100 samples, in recordings of other sizes and phases.
 
@@ -179,6 +179,14 @@ def test_periods_are_found_and_compared_within_a_recording(
     assert floor.method == "periods"
     assert floor.rms == pytest.approx([NOISE], rel=0.05)
     assert floor.ratio(fitted) > 5
+
+
+@pytest.mark.parametrize(("period", "clock"), [(100 / 3, 1.0), (62.5, 1.0), (100.0, 1.0004)])
+def test_a_stated_period_need_not_be_whole_samples(period: float, clock: float) -> None:
+    fitted, recording = repeated((1.0,), periods=(period,))
+    floor = from_residual(fitted, recording, clock * period / RATE, len(recording))
+    assert floor.method == "periods"
+    assert floor.rms == pytest.approx([NOISE], rel=0.1)
 
 
 @pytest.mark.parametrize(("periods", "found"), [((50, 125), True), ((100, 143), False)])

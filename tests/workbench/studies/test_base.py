@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from rigwatch.commands import main
+from rigwatch.workbench.compare import find_base
 from rigwatch.workbench.study.study import open_study
 from tests.workbench.machine import recorded, studied
 from tests.workbench.studies.test_own_model import PORT, SPEED, UNITS, run
@@ -49,6 +50,14 @@ def test_the_variant_that_the_rig_has_is_enough_is_taken_and_undone(
     assert main(["undo", str(study)]) == 0
     assert open_study(study).file.variants == ()
     assert main(["study", "replay", str(study)]) == 0
+
+
+def test_the_noise_of_resampled_recordings_is_that_of_the_band_that_they_keep(
+    study: Path,
+) -> None:
+    text = (study / "study.toml").read_text()
+    (study / "study.toml").write_text(f"rate = 80.0\n{text}")
+    assert find_base(open_study(study)).enough.over_noise < 1.2
 
 
 def test_what_cannot_be_taken_is_one_line(study: Path, capsys: pytest.CaptureFixture[str]) -> None:

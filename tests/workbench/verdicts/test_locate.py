@@ -1,7 +1,10 @@
 """Where a model fails is where the hidden effect acts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from msgspec import structs
 
 from rigwatch.workbench.compare.location import Region, locate
 from rigwatch.workbench.compare.preparation import Bench
@@ -60,3 +63,15 @@ def test_dry_friction_changes_sides_with_the_direction() -> None:
 def test_a_healthy_plant_fails_nowhere() -> None:
     found = locate(opened(multisine(MANY, 4.0)))
     assert all(r.p_value > 1e-4 for r in found if r.view in ("time", "motion", "amplitude"))
+
+
+def test_pieces_of_a_part_hours_behind_the_beginning_stay_apart() -> None:
+    bench = opened(multisine(MANY, 4.0))
+    file = bench.study.file
+    late = structs.replace(file, train=(structs.replace(file.train[0], start=40000.0),))
+    at_first, found = (
+        regions(one, "time", "position")
+        for one in (bench, replace(bench, study=replace(bench.study, file=late)))
+    )
+    assert [len(r.samples) for r in found] == [len(r.samples) for r in at_first]
+    assert {r.name.partition(" to ")[0] for r in found} >= {"40000", "40005"}

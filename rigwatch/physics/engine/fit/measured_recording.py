@@ -2,7 +2,8 @@
 
 The motion is smoothed with zero phase, with a width chosen from each channel's noise, and added to
 the inputs. Samples do not count (NaN outputs) if the smoothing window is incomplete, as next to
-a gap, and while hidden states settle.
+a gap, and while hidden states settle: at the beginning of a recording, and after a hole in what
+drives them, through which they have followed an interpolated motion.
 
 If the balance of a state is predicted, it is compared with the rate of the channel. The
 differentiating kernel is also a low-pass, which the prediction is not subject to. Both are
@@ -21,7 +22,7 @@ from rigwatch.physics.engine.equations import (
     predicted_outputs,
 )
 from rigwatch.physics.engine.fit.decimation import Thinning
-from rigwatch.physics.engine.fit.recording import Recording, filled
+from rigwatch.physics.engine.fit.recording import Recording, ends_of_holes, filled
 from rigwatch.physics.engine.fit.smoothing import best_width, flat_to, smoothed
 from rigwatch.physics.transfer import SensorPhase, sensor_phase
 from rigwatch.wire.arrays import BoolArray, FloatArray
@@ -46,7 +47,8 @@ def motion_recording(
         model: the original model, not transformed.
         recording: its inputs and outputs.
         parts: lengths of the concatenated parts; the recording's own if empty.
-        settling: time at the start of each part that does not count [s].
+        settling: time that does not count at the start of each part and after each long hole in
+            what drives the model [s].
         widths: of the smoothing, by channel [samples]; chosen from the noise if None.
         late: lateness of channels of the motion [s], see `motion_phases`; none if None.
 
@@ -56,7 +58,9 @@ def motion_recording(
     cut = _ends(recording, parts)
     chosen = motion_widths(model, recording, parts) if widths is None else widths
     channels = _channels(model, recording)
-    counted = _settled(len(recording), cut, round(settling / recording.dt))
+    driving = np.column_stack([channels[state.channel] for state in measured_states(model)])
+    begins = (0, *cut, *recording.breaks, *ends_of_holes(driving))
+    counted = _settled(len(recording), begins, round(settling / recording.dt))
     spacings, motion = _spacings(recording, cut), []
     for state in measured_states(model):
         signal, width = channels[state.channel], chosen[state.channel]
@@ -229,9 +233,9 @@ def _whole_kernel(signal: FloatArray, width: int, cut: Sequence[int]) -> BoolArr
     ])  # fmt: skip
 
 
-def _settled(samples: int, cut: Sequence[int], settling: int) -> BoolArray:
-    """Samples later than `settling` after the start of their part, shape (n,)."""
+def _settled(samples: int, begins: Sequence[int], settling: int) -> BoolArray:
+    """Samples later than `settling` after each at which hidden states begin, shape (n,)."""
     found = np.ones(samples, np.bool_)
-    for begin in (0, *cut):
+    for begin in begins:
         found[begin : begin + settling] = False
     return found

@@ -14,6 +14,9 @@ from rigwatch.wire.errors import ModelError
 SAME_SPACING = 1e-6
 """Relative difference of times between samples up to which they are the same."""
 
+LONG_HOLE = 3
+"""Samples without a valid input, one after the other, from which hidden states begin anew."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
@@ -237,3 +240,14 @@ def filled(signal: FloatArray) -> FloatArray:
         return np.zeros_like(signal)
     at = np.arange(len(signal))
     return np.interp(at, at[good], signal[good])
+
+
+def ends_of_holes(signals: FloatArray) -> tuple[int, ...]:
+    """First samples after long holes in what drives a model: no state is followed through them.
+
+    Args:
+        signals: shape (n, signals), NaN without a valid sample.
+    """
+    missing = np.concatenate([[False], ~np.isfinite(signals).all(axis=1), [False]])
+    begins, ends = np.flatnonzero(np.diff(missing)).reshape(-1, 2).T
+    return tuple(ends[ends - begins >= LONG_HOLE].tolist())

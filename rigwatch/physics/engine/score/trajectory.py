@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,7 @@ class Trajectory:
         inputs: at the nodes, those that arrive late last, shape (windows, nodes, inputs).
         time: at the nodes, shape (windows, nodes) [s].
         parameters: all of them, shape (n_p,).
+        recordings: windows of each of the joined recordings; all of one if empty.
     """
 
     compiled: CompiledSystem
@@ -41,6 +43,7 @@ class Trajectory:
     inputs: FloatArray
     time: FloatArray
     parameters: FloatArray
+    recordings: tuple[slice, ...] = ()
 
 
 def trajectory(
@@ -82,7 +85,15 @@ def trajectory(
         else:
             behind = np.ceil(after - place).astype(np.int64)
             at_nodes[..., column] = signal[np.maximum(rows - behind, oldest)]
-    return Trajectory(compiled, run, at_nodes, (rows + place) * spacing, parameters)
+    time = (rows + place) * spacing
+    apart = () if begins is None else _apart(begins[starts])
+    return Trajectory(compiled, run, at_nodes, time, parameters, apart)
+
+
+def _apart(begun: IntArray) -> tuple[slice, ...]:
+    """Windows of each recording, from the first sample of that of each window."""
+    first = np.flatnonzero(np.diff(begun, prepend=-1)).tolist()
+    return tuple(slice(*ends) for ends in pairwise([*first, len(begun)]))
 
 
 def port_signals(at: Trajectory, port_name: str) -> dict[str, FloatArray]:
@@ -142,16 +153,30 @@ def memory(
 ) -> Callable[[Mapping[str, float]], dict[str, FloatArray]]:
     """The effect's own states at the nodes, by name, as a function of its parameters' values.
 
-    They are driven by the signals at its port. One run covers all windows: each window continues
-    from the end of the previous one, whose last sample is held for one sample period.
+    They are driven by the signals at its port. One run covers all windows of a recording: each
+    continues from the end of the previous one, whose last sample is held for one sample period.
     """
+    apart = at.recordings or (slice(None),)
+    runs = [_recorded(at, candidate, signals, own) for own in apart]
+
+    def found(values: Mapping[str, float]) -> dict[str, FloatArray]:
+        each = [run(values) for run in runs]
+        return {name: np.concatenate([one[name] for one in each]) for name in each[0]}
+
+    return found
+
+
+def _recorded(
+    at: Trajectory, candidate: Candidate, signals: Mapping[str, FloatArray], own: slice
+) -> Callable[[Mapping[str, float]], dict[str, FloatArray]]:
+    """`memory` for the windows of one recording."""
     more = ((0, 0), (0, at.run.substeps - 1))
-    along = {name: np.pad(signal, more, mode="edge").ravel() for name, signal in signals.items()}
-    spacing = np.pad(at.run.spacing, more, mode="edge").ravel()
+    along = {n: np.pad(signal[own], more, mode="edge").ravel() for n, signal in signals.items()}
+    spacing = np.pad(at.run.spacing[own], more, mode="edge").ravel()
     model = at.compiled.system.model
     hold = hold_at(model, model.ports[candidate.port])
     states = EffectStates(candidate.effect, along, spacing, hold, at.run.substeps)
-    windows, nodes = at.time.shape
+    windows, nodes = at.time[own].shape
 
     def found(values: Mapping[str, float]) -> dict[str, FloatArray]:
         run = states.run(values).items()

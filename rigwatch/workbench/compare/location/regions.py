@@ -118,8 +118,10 @@ def _by_time(bench: Bench, rows: IntArray) -> list[str]:
         pieces = max(round(PIECES["time"] * len(own) / len(rows)), 1)
         edges = np.linspace(0, len(own), pieces + 1).astype(int)
         name = f"{recording_name(bench, at)}, " if len(bench.data.train.slices) > 1 else ""
+        # Of a part that lies hours behind the beginning, each piece has another name.
+        digits = max(4, 2 + int(np.log10(max(own[-1] / (np.ptp(own) or 1.0), 1.0) * pieces)))
         for a, b in pairwise(edges):
-            label = f"{name}{own[a]:.4g} to {own[min(b, len(own) - 1)]:.4g} s"
+            label = f"{name}{own[a]:.{digits}g} to {own[min(b, len(own) - 1)]:.{digits}g} s"
             labels += [label] * (b - a)
     return labels
 

@@ -62,7 +62,7 @@ def _share(residuals: FloatArray, at: BoolArray) -> float:
 
 
 def expected_error(
-    residuals: FloatArray, healthy: FloatArray, reading: FloatArray
+    residuals: FloatArray, healthy: FloatArray, reading: FloatArray, factor: int = 1
 ) -> ErrorSpectrum | None:
     """The model's own error along a motion; None if a recording is too short or too broken.
 
@@ -70,27 +70,30 @@ def expected_error(
         residuals: of the model on the healthy recording, shape (windows, length, outputs).
         healthy: outputs of the healthy recording, shape (n, outputs).
         reading: outputs of the recording to be explained, shape (m, outputs).
+        factor: decimation of the residuals, which the outputs do not have.
     """
-    error, least, motion = (band_energy(each) for each in (residuals, healthy, reading))
+    error = band_energy(residuals)
+    least, motion = (band_energy(each, factor) for each in (healthy, reading))
     if error is None or least is None or motion is None:
         return None
     larger = np.maximum(motion / np.maximum(least, 1e-300), 1.0)
     return ErrorSpectrum(error * larger)
 
 
-def band_energy(signals: FloatArray) -> FloatArray | None:
+def band_energy(signals: FloatArray, finer: int = 1) -> FloatArray | None:
     """Squared rms of signals in each band, shape (bands, outputs).
 
     Args:
         signals: shape (n, outputs) or (windows, length, outputs); windows follow one another.
+        finer: samples of the signals in one of those whose bands are taken.
 
     Returns:
         None if too few whole segments hold valid samples only.
     """
     series = signals.reshape(-1, signals.shape[-1])
     series = series[np.isfinite(series).all(axis=1)]
-    if len(series) < SEGMENT * (LEAST_SEGMENTS + 1) // 2:
+    if len(series) < finer * SEGMENT * (LEAST_SEGMENTS + 1) // 2:
         return None
-    _, power = welch(series, nperseg=SEGMENT, axis=0, detrend=False, scaling="spectrum")
+    _, power = welch(series, nperseg=finer * SEGMENT, axis=0, detrend=False, scaling="spectrum")
     # Of a Hann window, whose equivalent noise bandwidth is 1.5 bins.
-    return np.asarray(np.add.reduceat(power / 1.5, EDGES[:-1], axis=0))
+    return np.asarray(np.add.reduceat(power[: EDGES[-1]] / 1.5, EDGES[:-1], axis=0))

@@ -48,6 +48,8 @@ FEWEST_PERIODS = 3
 """Periods of one recording; of several, as many differences between periods."""
 REPEATED = 2e-4
 """Mean square difference of an input one period later, relative to its own; rms 1 % of each."""
+SAME_PERIOD = 1e-3
+"""Relative difference from whole samples up to which it is the clock's, not the period's."""
 _PERIODS: WeakKeyDictionary[Recording, int] = WeakKeyDictionary()
 _WITHIN: WeakKeyDictionary[Recording, int] = WeakKeyDictionary()
 
@@ -140,7 +142,7 @@ def from_residual(
             leaves repeats with them.
     """
     factor = recording.thinning.factor if recording.thinning else 1
-    samples = round(period / recording.dt) if period else _period_within(recording)
+    samples = _in_samples(period / recording.dt) if period else _period_within(recording)
     series = fitted.residuals.reshape(-1, fitted.residuals.shape[-1])
     if samples and (samples % horizon == 0 or len(fitted.residuals) == 1) and samples % factor == 0:
         found = _between(_apart(series, recording), samples // factor)
@@ -153,6 +155,15 @@ def from_residual(
     if own is not None and np.all(own[0] < quiet):
         return NoiseFloor(own[0], "repeats", own[1])
     return NoiseFloor(np.array(quiet), "quiet band", max(chances))
+
+
+def _in_samples(period: float) -> int:
+    """The first whole number of samples that is one period or several.
+
+    At a period of 33.3 samples the 33rd is none: over ten of them the phase is another.
+    """
+    several = (count * period for count in range(1, round(1 / SAME_PERIOD)))
+    return next((round(n) for n in several if abs(round(n) - n) <= SAME_PERIOD * n), 0)
 
 
 def repeats_at_once(study: Study) -> bool:
