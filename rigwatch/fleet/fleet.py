@@ -1,7 +1,7 @@
 """Polls many rigs at once."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -16,6 +16,8 @@ MOST_AT_ONCE = 64
 """Rigs that are asked at the same time."""
 SILENT_S = 2.5
 """Time without a message of health, which comes every second, after which a process hangs [s]."""
+NEXT_WITHIN_S = 1.5
+"""Time within which a process that is well says the next one [s]."""
 _PROCESSES = ("monitor", "recorder", "witness")
 
 
@@ -35,7 +37,6 @@ class Onlooker:
         self._last: dict[str, Health] = {}
         self._heard_at: dict[str, float] = {}
         self._hung: set[str] = set()
-        self._given_time: set[str] = set()
 
     def state(self) -> RigState:
         """The present state."""
@@ -80,31 +81,32 @@ class Onlooker:
         return ["daq", *(name for name in _PROCESSES if getattr(self._config, name) is not None)]
 
     def _hear(self, present: set[str]) -> None:
-        """Take the messages of health; wait for one of each process not heard yet."""
+        """Take the messages of health; wait for one of each process not heard yet, or just back."""
         assert self._healths is not None
         now = time.monotonic()
-        until = now + self._timeout
         for name in set(self._heard_at) - present:
             del self._heard_at[name]  # its time begins anew when it comes back
-        self._give_time(present - set(self._heard_at), now)
+        for name in present:
+            self._heard_at.setdefault(name, now)
         for health in self._healths.drain():
             self._take(health)
+        self._wait(lambda: present - set(self._last), now + self._timeout)
         # Between two looks it may have been away, and have only just come back.
-        self._give_time(self._silent(present) - self._given_time, now)
-        while present - set(self._last) and (left := until - time.monotonic()) > 0:
+        self._wait(
+            lambda: self._silent(present) - self._hung, now + min(self._timeout, NEXT_WITHIN_S)
+        )
+
+    def _wait(self, unheard: Callable[[], set[str]], until: float) -> None:
+        """Wait for messages of health of these until a monotonic time [s]."""
+        assert self._healths is not None
+        while unheard() and (left := until - time.monotonic()) > 0:
             if (health := self._healths.get(timeout=left)) is not None:
                 self._take(health)
-
-    def _give_time(self, names: set[str], now: float) -> None:
-        """Let the time begin in which a process has to say something, once until it does."""
-        self._heard_at |= dict.fromkeys(names, now)
-        self._given_time |= names
 
     def _take(self, health: Health) -> None:
         name = health.source.partition("/")[0]
         if name in self._heard_at or is_remembered(self._last, name):
             self._last[name], self._heard_at[name] = health, time.monotonic()
-            self._given_time.discard(name)
 
     def close(self) -> None:
         """Leave the rig's bus."""

@@ -105,7 +105,9 @@ def run(config: RigConfig, stop: threading.Event) -> None:
 def _route(config: RigConfig, refusals: RefusalLog, stop: threading.Event) -> None:
     heartbeat, report = Heartbeat("router"), RouterReport(config, refusals, stop)
     router = FollowedRouter(config)
-    report.start()
+    # A headquarters without keys has the name of its site's router, which reports itself.
+    if config.bus.security.keys or not config.bus.links:
+        report.start()
     keep_memory_tidy(stop)
     heartbeat.ready(f"listens at {config.bus.listen}")
     # Samples do not pass through this loop.
