@@ -11,6 +11,7 @@ import numpy as np
 from monitor.reference.reference_state import (
     APERIODIC,
     ARMED,
+    STRETCHES,
     Reference,
     ReferenceRules,
 )
@@ -18,8 +19,6 @@ from monitor.signals import fill_rows
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import part
 
-STRETCHES = 16
-"""Number of stretches of `learn` samples that give the reference of an aperiodic excitation."""
 APERIODIC_CYCLE = 256
 """Assumed cycle of the motion for an aperiodic drive [samples]."""
 

@@ -9,6 +9,8 @@ from rigwatch.wire.arrays import FloatArray
 
 SETTLING, LEARNING, ARMED, RESUMING = 0, 1, 2, 3
 NO_REFERENCE, FROM_MODEL, FROM_RUN, APERIODIC, FIXED = 0, 1, 2, 3, 4
+STRETCHES = 16
+"""Number of stretches of `learn` samples that give the reference of an aperiodic excitation."""
 
 _COUNTS = np.dtype(
     [
@@ -83,7 +85,8 @@ class ReferenceRules(NamedTuple):
 
 def new_reference(rules: ReferenceRules, known: list[tuple[FloatArray, float, int]]) -> Reference:
     """Initial state with the model file's references: ((4, P) signals, scale, periods averaged)."""
-    longest = max([rules.longest_period, *[signals.shape[1] for signals, _, _ in known]])
+    lengths = [signals.shape[1] for signals, _, _ in known]
+    longest = max(rules.longest_period, STRETCHES, *lengths)
     stored = np.zeros((len(known), 4, longest))
     for place, (signals, _, _) in enumerate(known):
         stored[place, :, : signals.shape[1]] = signals

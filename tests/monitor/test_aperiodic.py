@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from monitor.pipeline.pipeline import Result
+from monitor.reference.reference_state import STRETCHES, ReferenceRules, new_reference
 from monitor.signals import conditions as kinds
 from sim_plant.excitation import Chirp, Multisine, Recorded, Shape
 from tests.monitor.monitor_rig import RATE, SINE, UNITS, active, friction, run, watched
@@ -44,6 +45,15 @@ def test_a_healthy_rig_raises_nothing(drive: object) -> None:
     for name in (*FAULTS, kinds.EXCITATION_CHANGED):
         assert not said(result, name), name
     assert said(result, kinds.REFERENCE_LEARNT)
+
+
+def test_its_stretches_have_room_whatever_the_longest_period_is() -> None:
+    rules = ReferenceRules(
+        settle=8, learn=8, longest_period=4, residual_noise=1.0, position_noise=1.0,
+        voltage_noise=1.0, fixed=False,
+    )  # fmt: skip
+    reference = new_reference(rules, [])
+    assert reference.sums.shape[1] >= STRETCHES
 
 
 @pytest.mark.parametrize(("level", "within_s"), [(0.1, 8.0), (0.2, 4.0), (0.4, 4.0)])
