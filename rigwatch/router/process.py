@@ -117,4 +117,5 @@ def _route(config: RigConfig, refusals: RefusalLog, stop: threading.Event) -> No
         report.trouble = router.trouble
         heartbeat.advance(0)
     heartbeat.stopping()
+    report.finish()
     router.close()

@@ -28,6 +28,8 @@ BETWEEN_EVENTS = 60.0
 """Shortest time between two events about refusals [s]."""
 BETWEEN_LOOKS, DAY = 60.0, 86_400.0
 """Time between two checks of the certificates' ends, and between two events about them [s]."""
+LEAVING = 5.0
+"""Longest wait for the thread's end: it leaves the bus, or gives up an attempt to join it [s]."""
 
 
 class RouterReport:
@@ -41,6 +43,7 @@ class RouterReport:
 
     def __init__(self, config: RigConfig, refusals: RefusalLog, stop: threading.Event) -> None:
         self._config, self._refusals, self._stop = config, refusals, stop
+        self._thread = threading.Thread(target=self._run, name="router report", daemon=True)
         self._said = (0, 0)
         self._said_at = -BETWEEN_EVENTS
         self._looked_at = self._warned_at = -math.inf
@@ -50,7 +53,12 @@ class RouterReport:
 
     def start(self) -> None:
         """Begin to report."""
-        threading.Thread(target=self._run, name="router report", daemon=True).start()
+        self._thread.start()
+
+    def finish(self) -> None:
+        """Wait for the thread's end after `stop`: one within Zenoh would abort the process."""
+        if self._thread.ident is not None:
+            self._thread.join(LEAVING)
 
     def _run(self) -> None:
         try:

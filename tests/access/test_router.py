@@ -245,3 +245,33 @@ def test_a_key_that_the_account_may_not_read_is_named(
     config = SecuredRig(tmp_path, keys).config
     with pytest.raises(KeysError, match=r"daq\.key: this account may not read it"):
         connect(config, "daq", 0.1)
+
+
+ENDED_AT_ONCE = """
+import sys, threading, time
+from contextlib import contextmanager
+from rigwatch import router
+from rigwatch.router import report
+from rigwatch.wire.rig_config import load_rig
+
+joined = report.joined
+
+@contextmanager
+def left_slowly(*arguments):
+    with joined(*arguments) as bus:
+        yield bus
+    time.sleep(0.5)
+
+report.joined = left_slowly
+stop = threading.Event()
+threading.Timer(float(sys.argv[2]), stop.set).start()
+router.run(load_rig(sys.argv[1]), stop)
+assert "router report" not in [thread.name for thread in threading.enumerate()]
+"""
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.1, 0.4])
+def test_a_router_that_ends_leaves_no_thread_in_zenoh(tmp_path: Path, after_s: float) -> None:
+    path = TestRig(tmp_path).path
+    words = [sys.executable, "-c", ENDED_AT_ONCE, str(path), str(after_s)]
+    assert subprocess.run(words, check=False, timeout=PATIENCE).returncode == 0
