@@ -15,6 +15,7 @@ from rigwatch.wire.delivery import RingStore
 from rigwatch.wire.kept_state import KeptState
 from rigwatch.wire.kernel import part
 from rigwatch.wire.messages import ByteArray, SampleBlock, encode, layout_of
+from rigwatch.wire.packed_numbers import WORD, put_word
 
 MOST_TEXTS = 512
 """Texts that are kept: all lengths that a reading of a line can have, of a few kinds of rigs."""
@@ -118,7 +119,5 @@ def _write_number(to: ByteArray, start: int, end: int, number: int) -> None:
 
 @part()
 def _write_numbers(to: ByteArray, at: int, numbers: IntArray) -> None:
-    """Eight bytes for each, little endian."""
     for k in range(numbers.size):
-        for byte in range(8):
-            to[at + 8 * k + byte] = numbers[k] >> 8 * byte & 0xFF
+        put_word(to, at + WORD * k, numbers[k])

@@ -14,10 +14,7 @@ from rigwatch.wire.arrays import IntArray
 from rigwatch.wire.kept_state import KeptState, kept
 from rigwatch.wire.kernel import kernel, part
 from rigwatch.wire.messages import ByteArray, Layout, Numbers, gather_with
-
-_NO_NUMBER = -(1 << 62)
-_LONGEST_NUMBER = 9
-"""Bytes of a number of 63 bits; a longer one is left to the general decoder."""
+from rigwatch.wire.packed_numbers import filling_number, word_at
 
 
 class Places(NamedTuple):
@@ -28,7 +25,7 @@ class Places(NamedTuple):
         fixed: the bytes that all blocks of the layout share.
         parts: offset and size of each part of them, shape (parts, 2).
         heads: offset and size of the device's name and of the boot, shape (2, 2).
-        seq: offset and size of the first number, shape (2,).
+        seq: where the first number begins and ends, shape (2,).
         words: offsets of the times, then of the values.
         flags: offsets of the quality of the columns that have it.
     """
@@ -81,8 +78,8 @@ def _places(layout: Layout) -> KeptState:
 
 def _new_places(layout: Layout) -> KeptState:
     sizes = [len(part) for part in layout.parts]
-    spans = [span or (0, 0) for span in (layout.device, layout.boot, layout.seq)]
-    *heads, seq = [(start, stop - start) for start, stop in spans]
+    spans = [span or (0, 0) for span in (layout.device, layout.boot)]
+    heads = [(start, stop - start) for start, stop in spans]
     words = [*layout.times, *(place.values for place in layout.columns)]
     flags = [place.quality for place in layout.columns if place.quality >= 0]
     return KeptState(
@@ -91,7 +88,7 @@ def _new_places(layout: Layout) -> KeptState:
             np.array([*b"".join(layout.parts)], np.uint8),
             np.array([*zip(layout.starts, sizes, strict=True)], np.int64),
             np.array(heads, np.int64),
-            np.array(seq, np.int64),
+            np.array(layout.seq or (0, 0), np.int64),
             np.array(words, np.int64),
             np.array(flags, np.int64),
         )
@@ -128,7 +125,8 @@ def join_run(  # noqa: PLR0917 -- a compiled kernel takes no keywords
     for p in range(layouts.size):
         one, first = kept(like, layouts[p]), kept(like, layouts[0])
         here = data[ends[p] : ends[p + 1]]
-        if not _has_parts(one, here) or _first_number(one, here) != seq + at:
+        begin, end = one.seq[0], one.seq[1]
+        if not _has_parts(one, here) or filling_number(here, begin, end) != seq + at:
             return False
         for k in range(2):
             if not _alike(here, one.heads[k], data, first.heads[k]):
@@ -136,7 +134,7 @@ def join_run(  # noqa: PLR0917 -- a compiled kernel takes no keywords
         n = one.samples[0]
         for row in range(words.shape[0]):
             for k in range(n):
-                words[row, at + k] = _word(here, one.words[row] + 8 * k)
+                words[row, at + k] = word_at(here, one.words[row] + 8 * k)
         for row in range(flags.shape[0]):
             for k in range(n):
                 flags[row, at + k] = here[one.flags[row] + k]
@@ -167,26 +165,3 @@ def _alike(data: ByteArray, span: IntArray, other: ByteArray, span_of_other: Int
         if data[span[0] + k] != other[span_of_other[0] + k]:
             return False
     return True
-
-
-@part()
-def _first_number(one: Places, data: ByteArray) -> int:
-    """The number that fills its place, `_NO_NUMBER` if none does."""
-    start, size, value = one.seq[0], one.seq[1], 0
-    if size > _LONGEST_NUMBER:
-        return _NO_NUMBER
-    for k in range(size):
-        byte = np.int64(data[start + k])
-        if (byte >= 0x80) != (k < size - 1):
-            return _NO_NUMBER
-        value |= int(byte & 0x7F) << 7 * k
-    return (value >> 1) ^ -(value & 1)
-
-
-@part()
-def _word(data: ByteArray, at: int) -> int:
-    """Eight bytes, little endian."""
-    value = np.int64(0)
-    for k in range(8):
-        value |= np.int64(data[at + k]) << 8 * k
-    return int(value)

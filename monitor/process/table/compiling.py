@@ -11,14 +11,13 @@ from monitor.pipeline import (
     SteadyRows,
 )
 from monitor.process.table.kept_rows import KeptRows
-from rigwatch.wire.bus import Blocks, EstimateRows, JointRows, Source, join
+from rigwatch.wire.bus import Source, join
 from rigwatch.wire.messages import (
-    MOST_ROW_COLUMNS,
-    MOST_ROW_SAMPLES,
     Column,
     SampleBlock,
     encode,
 )
+from rigwatch.wire.rows import MOST_COLUMNS, MOST_SAMPLES, Blocks, EstimateRows, JointRows
 
 _RIG, _BOOT, _SAMPLES = "rig", 1, 4
 
@@ -35,8 +34,8 @@ def compile_table(model: RigModel, known: set[str] | None = None) -> None:
     if (state := rig.steady()) is None or state.kind in known:
         return
     known.add(state.kind)
-    reading, steady = JointRows(1), SteadyRows(1, MOST_ROW_COLUMNS)
-    estimates = EstimateRows(1, PUBLISHED_NAMES, MOST_ROW_SAMPLES)
+    reading, steady = JointRows(1), SteadyRows(1, MOST_COLUMNS)
+    estimates = EstimateRows(1, PUBLISHED_NAMES, MOST_SAMPLES)
     reading.name(0, _RIG)
     reading.open(_RIG, Source(_RIG, _RIG, _BOOT, lambda _: True), n)
     reading.take(join([(_RIG, b"", encode(_block(model, n)))]), _RIG)

@@ -12,15 +12,14 @@ from monitor.pipeline import CHANGE_ROW, OUTPUT_ROWS, SampleRows
 from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
 from rigwatch.wire.kernel import kernel
 from rigwatch.wire.messages import (
-    MOST_ROW_COLUMNS,
-    MOST_ROW_SAMPLES,
     Column,
     EstimateBlock,
     Names,
     SampleBlock,
 )
+from rigwatch.wire.rows import MOST_COLUMNS, MOST_SAMPLES
 
-ROOM = JOINED + MOST_ROW_SAMPLES
+ROOM = JOINED + MOST_SAMPLES
 _CHANGE = "change", "m/s^2"
 
 
@@ -52,7 +51,7 @@ class KeptRows:
             np.zeros(count, np.int64),
             np.full(count, JOINED, np.int64),
             np.zeros((count, 2, ROOM), np.int64),
-            np.zeros((count, MOST_ROW_COLUMNS + 1, ROOM)),
+            np.zeros((count, MOST_COLUMNS + 1, ROOM)),
         )
         self._columns = np.zeros(count, np.int64)
 

@@ -22,24 +22,26 @@ from monitor.process.rig_time import APART_NS
 from monitor.process.table.kept_rows import KeptRows
 from rigwatch.wire.arrays import BoolArray
 from rigwatch.wire.bus import (
-    Batch,
-    Blocks,
-    EstimateRows,
     Joining,
     JointReceiver,
-    JointRows,
     MessageRing,
 )
 from rigwatch.wire.host import both_clocks
 from rigwatch.wire.kept_state import KeptState
 from rigwatch.wire.messages import (
     ESTIMATES,
-    MOST_ROW_COLUMNS,
-    MOST_ROW_SAMPLES,
     Form,
     Names,
     SampleBlock,
     decode,
+)
+from rigwatch.wire.rows import (
+    MOST_COLUMNS,
+    MOST_SAMPLES,
+    Batch,
+    Blocks,
+    EstimateRows,
+    JointRows,
 )
 
 CONNECTED_FOR = 0.05
@@ -97,8 +99,8 @@ class Table:
     def __init__(self, count: int, joint: JointReceiver) -> None:
         self._joint, self._reading = joint, JointRows(count)
         joint.rows = self._reading
-        self._steady = SteadyRows(count, MOST_ROW_COLUMNS)
-        self._estimates = EstimateRows(count, PUBLISHED_NAMES, MOST_ROW_SAMPLES)
+        self._steady = SteadyRows(count, MOST_COLUMNS)
+        self._estimates = EstimateRows(count, PUBLISHED_NAMES, MOST_SAMPLES)
         self._kept = KeptRows(count)
         self._rows: list[Row | None] = [None] * count
         self._sources: list[tuple[str, int, Names]] = [("", 0, ())] * count

@@ -23,7 +23,7 @@ from rigwatch.wire.messages.blocks import (
 )
 from rigwatch.wire.messages.codec import decode, decode_all, encode
 from rigwatch.wire.messages.json_fields import json_fields
-from rigwatch.wire.messages.layout import Layout, Names
+from rigwatch.wire.messages.layout import Form, Layout, Names
 from rigwatch.wire.messages.message_types import (
     EVERY_ALARM,
     LONGEST_NAME,
@@ -52,6 +52,7 @@ from rigwatch.wire.messages.message_types import (
     SampleBlock,
     Severity,
 )
+from rigwatch.wire.messages.message_types import Names as PlainNames
 from rigwatch.wire.messages.newest_alarms import (
     MOST_ALARMS,
     MOST_FIGURES,
@@ -62,6 +63,7 @@ from rigwatch.wire.messages.newest_alarms import (
     transitions,
 )
 from rigwatch.wire.messages.packed import UNFAMILIAR, decode_block, layout_of
+from rigwatch.wire.messages.packed_encoding import estimate_heads, estimate_tags, source_bytes
 from rigwatch.wire.messages.quality_flags import (
     NON_FINITE,
     RESAMPLED,
@@ -70,23 +72,6 @@ from rigwatch.wire.messages.quality_flags import (
     STALE,
     valid,
 )
-from rigwatch.wire.messages.rows import (
-    LONGEST_HEAD,
-    MOST_FORMS,
-    EstimateHeads,
-    Form,
-    Forms,
-    Heads,
-    estimate_size,
-    form_of,
-    new_forms,
-    read_block,
-    source_head,
-    store_form,
-    write_block,
-)
-from rigwatch.wire.messages.rows import MOST_COLUMNS as MOST_ROW_COLUMNS
-from rigwatch.wire.messages.rows import MOST_SAMPLES as MOST_ROW_SAMPLES
 from rigwatch.wire.messages.topics import (
     ALARMS,
     ALIVE_KEY,
@@ -118,16 +103,12 @@ __all__ = [
     "EVERY_ALARM",
     "GAPS",
     "HEALTH",
-    "LONGEST_HEAD",
     "LONGEST_NAME",
     "LONGEST_TEXT",
     "MODELS",
     "MONITOR_STALE",
     "MOST_ALARMS",
     "MOST_FIGURES",
-    "MOST_FORMS",
-    "MOST_ROW_COLUMNS",
-    "MOST_ROW_SAMPLES",
     "MOST_SOURCES",
     "NON_FINITE",
     "NOT_PROVED",
@@ -156,12 +137,9 @@ __all__ = [
     "Column",
     "ColumnTable",
     "EstimateBlock",
-    "EstimateHeads",
     "Event",
     "Form",
-    "Forms",
     "Gap",
-    "Heads",
     "Health",
     "Identity",
     "Layout",
@@ -169,6 +147,7 @@ __all__ = [
     "ModelChange",
     "Names",
     "Numbers",
+    "PlainNames",
     "RunInfo",
     "SampleBlock",
     "Severity",
@@ -185,8 +164,8 @@ __all__ = [
     "decode_all",
     "decode_block",
     "encode",
-    "estimate_size",
-    "form_of",
+    "estimate_heads",
+    "estimate_tags",
     "gather_with",
     "is_of_structure",
     "is_remembered",
@@ -194,19 +173,15 @@ __all__ = [
     "json_fields",
     "layout_of",
     "merged",
-    "new_forms",
     "pieces",
     "protobuf_schema",
     "quality_flags",
-    "read_block",
     "remember",
-    "source_head",
-    "store_form",
+    "source_bytes",
     "told_again",
     "topic",
     "topic_of",
     "transitions",
     "unseen",
     "valid",
-    "write_block",
 ]

@@ -134,6 +134,30 @@ class Layout:
         return device, boot, 0 if self.seq is None else integer(data, self.seq)
 
 
+@dataclass(frozen=True, eq=False)
+class Form:
+    """What blocks of samples of one boot and length have in common.
+
+    Attributes:
+        device, boot: of which they are.
+        samples: of each.
+        names: of their columns.
+        fixed: the bytes that they share, with zeros for the flags of quality, and elsewhere.
+        mask: 255 where bytes have to be those, else 0.
+        facts: where the rest lies.
+        columns: the offset of each column's values.
+    """
+
+    device: str
+    boot: int
+    samples: int
+    names: Names
+    fixed: NDArray[np.uint8]
+    mask: NDArray[np.uint8]
+    facts: tuple[int, ...]
+    columns: tuple[int, ...]
+
+
 @lru_cache(maxsize=NAMES_KEPT)
 def _same(names: Names) -> Names:
     """The first of equal names: layouts of many lengths have those of few kinds of blocks."""

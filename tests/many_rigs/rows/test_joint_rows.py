@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from rigwatch.wire.bus.several import Batch, Blocks, EstimateRows, JointRows, Received, Source
+from rigwatch.wire.bus.several import Received, Source
 from rigwatch.wire.bus.several.joint_message import Part, join, split
 from rigwatch.wire.bus.several.joint_receiver import JointReceiver, Share
 from rigwatch.wire.bus.several.joint_sender import LARGEST
@@ -15,6 +15,7 @@ from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock, encode
 from rigwatch.wire.messages.message_types import ColumnTable
 from rigwatch.wire.ordering import Numbered
+from rigwatch.wire.rows import Batch, Blocks, EstimateRows, JointRows
 
 RIGS = [f"rig{number}" for number in range(30)]
 NAMES = (("voltage", "V"), ("position", "m"), ("acceleration", "m/s^2"))

@@ -10,11 +10,11 @@ sends those of a moment as one, which only processes of several rigs receive. Wh
 rig listens at the rig's own key, where such a process sends as long as somebody is there.
 
 Blocks of samples that simply follow are taken out of a joined message for all rigs at once
-(`joint_rows`), and their estimates written into one (`joint_writing`).
+by open rows, and their estimates written into one (`rigwatch.wire.rows`).
 """
 
 from rigwatch.wire.bus.several.joint_link import JointLink
-from rigwatch.wire.bus.several.joint_message import join
+from rigwatch.wire.bus.several.joint_message import MOST_PARTS, Part, join, split
 from rigwatch.wire.bus.several.joint_receiver import (
     WAITING,
     Following,
@@ -22,24 +22,23 @@ from rigwatch.wire.bus.several.joint_receiver import (
     Received,
     Share,
 )
-from rigwatch.wire.bus.several.joint_rows import Batch, JointRows, Source
-from rigwatch.wire.bus.several.joint_sender import Alone, Among, alone_key
-from rigwatch.wire.bus.several.joint_writing import Blocks, EstimateRows
+from rigwatch.wire.bus.several.joint_sender import LARGEST, Alone, Among, alone_key
+from rigwatch.wire.bus.several.open_rows import Source
 
 __all__ = [
+    "LARGEST",
+    "MOST_PARTS",
     "WAITING",
     "Alone",
     "Among",
-    "Batch",
-    "Blocks",
-    "EstimateRows",
     "Following",
     "JointLink",
     "JointReceiver",
-    "JointRows",
+    "Part",
     "Received",
     "Share",
     "Source",
     "alone_key",
     "join",
+    "split",
 ]

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from rigwatch.wire.bus.several.joint_message import split
-from rigwatch.wire.bus.several.joint_rows import JointRows, Source
+from rigwatch.wire.bus.several.open_rows import OpenRows, Source
 from rigwatch.wire.bus.transport import Receive
 from rigwatch.wire.errors import MessageError
 
@@ -39,7 +39,7 @@ class JointReceiver:
 
     def __init__(self, following: Following) -> None:
         self.strange: deque[Received] = deque(maxlen=WAITING)
-        self.rows: JointRows | None = None
+        self.rows: OpenRows | None = None
         self._following = following
         self._rigs: dict[str, tuple[Share, ...]] = {}
         self._lock = threading.Lock()
@@ -104,7 +104,7 @@ class JointReceiver:
         if self.rows is not None:
             self.rows.close(rig)
 
-    def _distribute(self, rows: JointRows | None) -> None:
+    def _distribute(self, rows: OpenRows | None) -> None:
         while (found := self._following()) is not None:
             data, sender, _ = found
             try:
