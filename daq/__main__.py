@@ -12,13 +12,13 @@ from daq.acquisition import Acquisition
 from daq.adapter import Adapter
 from daq.adapters import adapter_for
 from daq.chain import Chain
-from daq.turns import Turns
 from rigwatch.wire.bus import Bus, joined
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.host import (
     DAQ,
     Heartbeat,
     Pulse,
+    Turns,
     prepare_for_real_time,
     raise_priority,
     set_at_signal,

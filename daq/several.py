@@ -14,13 +14,13 @@ from pathlib import Path
 from daq.__main__ import acquire
 from daq.adapters import adapter_for
 from daq.together import Lane
-from daq.turns import Turns
 from rigwatch.wire.bus import SharedLinks, joined
 from rigwatch.wire.host import (
     DAQ,
     Heartbeat,
     Part,
     RigPulse,
+    Turns,
     Work,
     prepare_for_real_time,
     raise_priority,

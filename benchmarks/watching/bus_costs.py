@@ -22,9 +22,9 @@ import psutil
 from benchmarks.archives.recordings import ROOT
 from benchmarks.processes.many_rigs_chain import rig_files
 from daq.several import TURN
-from daq.turns import Turns
 from rigwatch.wire.bus import Bus, SharedLinks, connect
 from rigwatch.wire.delivery import SampleReader
+from rigwatch.wire.host import Turns
 from rigwatch.wire.messages import SAMPLES
 from rigwatch.wire.rig_config import load_rig
 from tests.bus.rig import answers, kill

@@ -8,10 +8,12 @@ import hashlib
 import math
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from rigwatch.recorder.disk import DiskWatch
+from rigwatch.recorder.disks import Disks, take_turns
 from rigwatch.recorder.feed import Feed
 from rigwatch.recorder.folders import (
     LONGEST_BREAK,
@@ -88,15 +90,36 @@ class Recorder:
         self._told_trouble = self._trouble()
         self._positions = PositionFile(place.folder)
         self._kept: Positions = {}
+        self._taken: Positions = {}
+        self._now, self._now_ns = 0.0, 0
         if not remote:
             bus.publish(RUN, run)
             PastServer(bus, root, lambda: self._settled)
 
     def turn(self, now: float, t_ns: int) -> None:
         """Store received messages; `now` is monotonic time [s], `t_ns` Unix time [ns]."""
+        self.begin_turn(now, t_ns)
+        self.sync()
+        self.end_turn()
+
+    def begin_turn(self, now: float, t_ns: int) -> None:
+        """Take what was received, and write it unless that begins a file."""
+        self._now, self._now_ns = now, t_ns
         for message in self.feed.take():
             self.store.add(message)
-        self._flush(now, t_ns)
+        self._taken = self.feed.positions()
+        if not self.store.needs_file(now):
+            self.store.send(now)
+
+    def sync(self) -> None:
+        """Wait for the disk, in any thread."""
+        self.store.send(self._now)
+        self.store.sync()
+
+    def end_turn(self) -> None:
+        """Tell what came of it, and see to the rest."""
+        now, t_ns = self._now, self._now_ns
+        self._settle(now, t_ns)
         if self._length.is_over(now) and not self.store.failure:
             self._begin_session(now, t_ns)
         share = free_share(self.store.folder)
@@ -119,16 +142,15 @@ class Recorder:
         """What is wrong with the disk; a change is reported at once."""
         return bool(self.store.failure), self._disk.level
 
-    def _flush(self, now: float, t_ns: int) -> None:
-        taken = self.feed.positions()
-        self._tell(self.store.flush(now, t_ns))
+    def _settle(self, now: float, t_ns: int) -> None:
+        self._tell(self.store.settle(now, t_ns))
         self._note_segment()
         if not self.store.failure:
             self._settled = t_ns - UNSETTLED_NS
         # Without a segment there is no folder yet.
-        if not self.store.failure and self.store.segment_count and taken != self._kept:
-            self._kept = taken
-            self._positions.save(taken)
+        if not self.store.failure and self.store.segment_count and self._taken != self._kept:
+            self._kept = self._taken
+            self._positions.save(self._taken)
 
     def _begin_session(self, now: float, t_ns: int) -> None:
         """Go on in another folder; all that was taken is in the one before."""
@@ -189,8 +211,57 @@ class Recorder:
         self._bus.publish(HEALTH, Health(self._bus.process, t_ns, "stopped", "", {}))
 
 
-def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event, pulse: Pulse) -> Path:
+class _Turn:
+    """The turns of a recorder that still keeps its rig; `end` raises what was wrong before."""
+
+    def __init__(self, recorder: Recorder, kept: Kept, bus: Bus, pulse: Pulse) -> None:
+        self._recorder, self._kept, self._bus, self._pulse = recorder, kept, bus, pulse
+        self._error: Exception | None = None
+
+    def begin(self) -> None:
+        """See `disks.Turn`."""
+        self._try(self._begin)
+
+    def _begin(self) -> None:
+        self._kept.check()
+        self._recorder.begin_turn(time.monotonic(), time.time_ns())
+
+    def sync(self) -> None:
+        """See `disks.Turn`."""
+        if self._error is None:
+            self._try(self._recorder.sync)
+
+    def end(self) -> None:
+        """See `disks.Turn`."""
+        if self._error is not None:
+            raise self._error
+        self._recorder.end_turn()
+        waits = waits_for_samples(connected=self._bus.connected())
+        self._pulse.advance(self._recorder.feed.samples, waits)
+
+    def _try(self, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except Exception as error:  # ends this recording, and no other
+            self._error = error
+
+
+def record(
+    config: RigConfig,
+    run: RunInfo,
+    bus: Bus,
+    stop: threading.Event,
+    pulse: Pulse,
+    *,
+    disks: Disks | None = None,
+) -> Path:
     """Record until `stop` is set, telling `pulse` of each turn; returns the session's folder.
+
+    Args:
+        config, run, bus: of the `Recorder`.
+        stop: ends the recording.
+        pulse: is told of each turn.
+        disks: those of the process, if it records several rigs.
 
     Raises:
         SessionError: another process records this rig into the same folder.
@@ -200,12 +271,13 @@ def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event, pul
     try:
         recorder = Recorder(config, run, bus)
         pulse.ready(f"recording to {recorder.store.folder}")
+        turn = _Turn(recorder, kept, bus, pulse)
+        every = recorder.settings.flush * _OF_FLUSH
         try:
-            while not stop.wait(recorder.settings.flush * _OF_FLUSH):
-                kept.check()
-                recorder.turn(time.monotonic(), time.time_ns())
-                waits = waits_for_samples(connected=bus.connected())
-                pulse.advance(recorder.feed.samples, waits)
+            if disks is None:
+                take_turns(turn, every, stop)
+            else:
+                disks.serve(turn, root, every, stop)
             pulse.stopping()
         finally:
             recorder.close(time.monotonic(), time.time_ns())

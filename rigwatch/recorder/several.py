@@ -1,12 +1,14 @@
-"""Several rigs in one recorder process, each in a thread of its own.
+"""Several rigs in one recorder process; those of one disk take turns (`disks`).
 
-A disk that hangs or a session that takes long to go on with delays no other rig.
+Each rig begins and ends in a thread of its own: a session that takes long to go on with delays no
+other, and a disk that hangs delays those of no other disk.
 """
 
 import threading
 from functools import partial
 from pathlib import Path
 
+from rigwatch.recorder.disks import Disks
 from rigwatch.recorder.process import PROCESS, describe_run, process_name, record
 from rigwatch.wire.bus import SharedLinks, joined
 from rigwatch.wire.host import (
@@ -26,7 +28,9 @@ MANY = 32
 """Rigs from which on blocks are read by a compiled call: the compiler takes 130 MB once."""
 
 
-def work_of(path: Path, notes: str, folders: dict[Path, Path], links: SharedLinks) -> Work:
+def work_of(
+    path: Path, notes: str, folders: dict[Path, Path], links: SharedLinks, disks: Disks
+) -> Work:
     """The recording of one rig; it writes its session's folder into `folders` at its end."""
 
     def work(stop: threading.Event, pulse: RigPulse) -> None:
@@ -34,7 +38,7 @@ def work_of(path: Path, notes: str, folders: dict[Path, Path], links: SharedLink
         with joined(config, process_name(config), stop, pulse.say, links) as bus:
             if bus is not None:
                 run = describe_run(path, config, notes)
-                folders[path] = record(config, run, bus, stop, pulse)
+                folders[path] = record(config, run, bus, stop, pulse, disks=disks)
 
     return work
 
@@ -59,9 +63,10 @@ def run_several(paths: list[Path], stop: threading.Event, notes: str = "") -> li
     folders: dict[Path, Path] = {}
     valid_rigs(paths)  # a wrong file is named by its rig's thread
     keep_memory_tidy(stop)
-    links = SharedLinks(len(paths))
+    links, disks = SharedLinks(len(paths)), Disks()
     parts = [
-        Part(str(path), work_of(path, notes, folders, links), partial(used, path)) for path in paths
+        Part(str(path), work_of(path, notes, folders, links, disks), partial(used, path))
+        for path in paths
     ]
     run_side_by_side(parts, Heartbeat(PROCESS), stop, set_at_hangup())
     links.close()

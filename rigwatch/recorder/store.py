@@ -3,12 +3,15 @@
     add → waiting (bounded, oldest dropped and counted) → flush → segment 000001.mcap, 000002.mcap,
     …
 
+A flush has three steps, for callers that have several stores: `send` writes, `sync` waits for the
+disk, in any thread, and `settle` tells what came of it.
+
 If the disk is full, gone or read-only, messages wait in memory and the store retries once a second,
 in a new segment. These faults are not raised but returned as events.
 """
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
 
@@ -75,6 +78,7 @@ class Store:
         self._opened_at = self._retry_at = float("-inf")
         self._dropped_before = 0
         self._events: list[Event] = []
+        self._is_sent, self._sent_samples, self._error = False, 0, ""
 
     def add(self, message: Message) -> None:
         """Queue a message for the next flush; the oldest is dropped if memory is exhausted."""
@@ -92,17 +96,43 @@ class Store:
 
     def flush(self, now: float, t_ns: int) -> list[Event]:
         """Write waiting messages if possible; returns events (`t_ns`: their time)."""
-        if self._waiting and now >= self._retry_at:
-            try:
-                self._flush(now)
-            except SessionError as error:
-                self._fail(str(error), now, t_ns)
-            else:
-                self._recover(t_ns)
+        self.send(now)
+        self.sync()
+        return self.settle(now, t_ns)
+
+    def needs_file(self, now: float) -> bool:
+        """Whether the next `send` begins a segment, and waits for the disk meanwhile."""
+        return self._writer is None or now - self._opened_at >= self._segment
+
+    def send(self, now: float) -> None:
+        """Write waiting messages if possible; once until `settle`, before which none is added."""
+        if self._waiting and now >= self._retry_at and not self._is_sent:
+            self._is_sent = True
+            self._try(lambda: self._send(now))
+
+    def sync(self) -> None:
+        """Wait until what was sent is on the disk."""
+        if self._is_sent and not self._error and self._writer is not None:
+            self._try(self._writer.settle)
+
+    def settle(self, now: float, t_ns: int) -> list[Event]:
+        """See whether what was sent is on the disk; returns events (`t_ns`: their time)."""
+        if self._is_sent and self._error:
+            self._fail(self._error, now, t_ns)
+        elif self._is_sent:
+            self.samples += self._sent_samples
+            self._recover(t_ns)
+        self._is_sent, self._sent_samples, self._error = False, 0, ""
         events, self._events = self._events, []
         return events
 
-    def _flush(self, now: float) -> None:
+    def _try(self, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except SessionError as error:
+            self._error = str(error)
+
+    def _send(self, now: float) -> None:
         if self._writer is not None and now - self._opened_at >= self._segment:
             self._finish()
         if self._writer is None:
@@ -126,14 +156,12 @@ class Store:
     def _write_waiting(self) -> None:
         writer = self._writer
         assert writer is not None
-        samples = 0
         while self._waiting:
             message = self._waiting.popleft()
-            samples += len(message) if isinstance(message, SampleBlock) else 0
+            self._sent_samples += len(message) if isinstance(message, SampleBlock) else 0
             writer.write(message)
-        writer.flush()
+        writer.send()
         self._waiting_bytes = 0
-        self.samples += samples
 
     def _fail(self, reason: str, now: float, t_ns: int) -> None:
         """Requeue messages that did not reach the disk, and start a new segment later."""

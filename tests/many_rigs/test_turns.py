@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import pytest
 
-from daq.turns import PART, Turns
 from rigwatch.wire.bus.several.burst import Burst
+from rigwatch.wire.host.turns import PART, Turns
 from tests.waiting import eventually
 
 

@@ -33,6 +33,7 @@ from rigwatch.wire.host.realtime import (
     raise_priority,
 )
 from rigwatch.wire.host.side_by_side import Part, Pulse, RigPulse, Work, run_side_by_side
+from rigwatch.wire.host.turns import Turns
 from rigwatch.wire.host.whole_file import replace_file, write_through
 
 __all__ = [
@@ -50,6 +51,7 @@ __all__ = [
     "Printer",
     "Pulse",
     "RigPulse",
+    "Turns",
     "Work",
     "be_idle",
     "both_clocks",

@@ -58,8 +58,8 @@ class SessionWriter:
     """One session file being written.
 
     `write` buffers; `flush` merges the buffered messages, writes them at once and waits for the
-    disk. After a failed flush the file is unchanged, `pending` holds the unwritten messages,
-    and the writer is closed.
+    disk: `send` and then `settle`, which may be called in another thread. After a failure the file
+    is unchanged, `pending` holds the unwritten messages, and the writer is closed.
 
     Args:
         path: the file; it must not exist.
@@ -73,7 +73,7 @@ class SessionWriter:
     def __init__(self, path: Path | str, run: RunInfo, *, sync: bool = True) -> None:
         self.path = Path(path)
         self.pending: list[Message] = []
-        self._waiting = 0
+        self._waiting = self._sent = 0
         self._output = FileOutput(self.path, sync)
         self._mcap = chunk_writer(self._output)
         try:
@@ -112,6 +112,17 @@ class SessionWriter:
         Raises:
             SessionError: the disk is full, gone or read-only. `pending` still holds the messages.
         """
+        self.send()
+        self.settle()
+
+    def send(self) -> None:
+        """Write all buffered messages to the file; they are on the disk after `settle`.
+
+        Raises:
+            SessionError: as in `flush`.
+        """
+        if self._sent:
+            self.settle()
         if not self.pending and not self._output.waiting:
             return
         for chunk in by_chunk(merge_pending(self.pending)):
@@ -122,9 +133,18 @@ class SessionWriter:
                     self._mcap.flush()  # type: ignore[no-untyped-call]
                     size = 0
             self._mcap.flush()  # type: ignore[no-untyped-call]
-        self._output.commit()
-        self.pending.clear()
-        self._waiting = 0
+        self._output.send()
+        self._sent, self._waiting = len(self.pending), 0
+
+    def settle(self) -> None:
+        """Wait until what was sent is on the disk.
+
+        Raises:
+            SessionError: as in `flush`.
+        """
+        self._output.settle()
+        del self.pending[: self._sent]
+        self._sent = 0
 
     def _add(self, message: Message) -> int:
         """Put a message into the present chunk; its size [bytes]."""

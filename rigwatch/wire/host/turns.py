@@ -1,4 +1,4 @@
-"""One thread reads the open devices of several rigs, one after the other.
+"""One thread does what is due of several rigs, one after the other: devices read, sessions written.
 
     rig's thread   joins the bus, opens the device ──serve──▶ waits      ◀── lost, failed, stopped
     turns' thread                                     └▶ step, step │ step, step │ … each turn
@@ -19,9 +19,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 Step = Callable[[], bool]
-"""One reading of a device; returns whether to continue."""
+"""What is due of a rig in a turn; returns whether to continue."""
 PART = 16
-"""Rigs in a part of a turn, at least, if there are so many."""
+"""Rigs in a part of a turn of devices, at least, if there are so many."""
 SHORTEST_PART = 0.005
 """Shortest part of a turn: the turn of the monitor, which takes what came in it together [s]."""
 
@@ -39,7 +39,7 @@ class _Served:
 
 
 class Turns:
-    """The readings of all rigs of a process.
+    """The turns of the rigs of a process.
 
     Args:
         turn: time from one turn to the next [s].
@@ -47,6 +47,7 @@ class Turns:
         clock: monotonic time [s].
         sleep: waits for a number of seconds.
         before: called with the subjects of all rigs of a part, before their steps.
+        part: rigs in a part of a turn, at least, if there are so many.
     """
 
     def __init__(
@@ -55,9 +56,12 @@ class Turns:
         together: Callable[[], AbstractContextManager[object]],
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
+        *,
         before: Callable[[Sequence[Any]], None] = _each_alone,
+        part: int = PART,
     ) -> None:
         self.turn = turn
+        self._part = part
         self._before = before
         self._together, self._clock, self._sleep = together, clock, sleep
         self._served: list[_Served] = []
@@ -108,7 +112,7 @@ class Turns:
             self._take(one)
 
     def _parts_of(self, rigs: int) -> int:
-        return max(1, min(rigs // PART, int(self.turn / SHORTEST_PART)))
+        return max(1, min(rigs // self._part, int(self.turn / SHORTEST_PART)))
 
     def _goes_on(self) -> bool:
         with self._lock:
