@@ -1,6 +1,9 @@
 """The recorder's store against a disk that fills up, is missing, and comes back."""
 
+import errno
+import os
 import shutil
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +49,34 @@ def test_segments_follow_each_other_without_a_seam(tmp_path: Path) -> None:
     assert recorded(tmp_path / "s") == list(range(480))
     assert [open_session(tmp_path / "s" / name).info for name in names] == [RUN] * 3
     assert open_session(tmp_path / "s").unclosed == ()
+
+
+def test_a_disk_that_fails_while_it_is_waited_for_costs_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = Store(tmp_path / "s", RUN, segment=3600.0)
+    store.add(block(0))
+    assert store.flush(0.0, 0) == []
+    size = (tmp_path / "s" / "000001.mcap").stat().st_size
+
+    def fails(_descriptor: int) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    store.add(block(8))
+    store.send(1.0)
+    store.send(1.0)  # written once
+    assert (tmp_path / "s" / "000001.mcap").stat().st_size > size
+    with monkeypatch.context() as disk:
+        disk.setattr(os, "fsync", fails)
+        waits = threading.Thread(target=store.sync)
+        waits.start()
+        waits.join()
+    assert codes(store.settle(1.0, 0)) == ["RECORDING_STOPPED"]
+    assert "input/output error" in store.failure
+    assert (store.samples, (tmp_path / "s" / "000001.mcap").stat().st_size) == (8, size)
+    assert codes(store.flush(2.0, 0)) == ["RECORDING_RESUMED"]
+    store.close(3.0, 0)
+    assert (recorded(tmp_path / "s"), store.samples) == (list(range(16)), 16)
 
 
 def test_a_full_disk_costs_nothing_while_memory_lasts(tmp_path: Path) -> None:
