@@ -222,10 +222,11 @@ class Table:
         batches = self._reading.taken()
         heard_at = time.monotonic()
         for batch in batches:
-            ends = batch.at + batch.samples - 1
-            self._read[batch.rows] += batch.samples
-            self._read_ns[batch.rows] = batch.t_ns[ends]
-            self._heard_at[batch.rows] = heard_at
+            there = self._there[batch.rows]  # the others have failed since
+            rows, samples = batch.rows[there], batch.samples[there]
+            self._read[rows] += samples
+            self._read_ns[rows] = batch.t_ns[batch.at[there] + samples - 1]
+            self._heard_at[rows] = heard_at
         left: list[Left] = []
         for batch in batches:
             left += self._judge_one(batch, {one.number for one in left})

@@ -10,6 +10,7 @@ rig's reader, which has read all that has come, and closed by whatever does not 
 # Compiled functions are untyped to mypy.
 # mypy: disable-error-code="no-any-return"
 
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -101,7 +102,7 @@ class JointRows:
         self._numbers: dict[str, int] = {}
         self._senders: dict[str, int] = {}
         self._sources: list[Source | None] = [None] * count
-        self._batches: list[Batch] = []
+        self._batches: deque[Batch] = deque()
         self._messages = 0
         self.state = RowState(
             np.zeros((count, LONGEST_ID), np.uint8),
@@ -196,8 +197,8 @@ class JointRows:
 
     def taken(self) -> list[Batch]:
         """What has been taken since the last call, in order."""
-        found, self._batches = self._batches, []
-        return found
+        # In another thread than a reader's, which may add some meanwhile.
+        return [self._batches.popleft() for _ in range(len(self._batches))]
 
 
 def _left(data: bytes, wanted: BoolArray) -> list[Part]:

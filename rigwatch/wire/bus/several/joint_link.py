@@ -39,7 +39,7 @@ class JointLink:
     def collect(self) -> None:
         """Hand out what has come of all topics, but for what rows take."""
         for receiver in tuple(self._receivers.values()):
-            receiver.collect()
+            receiver.distribute()
 
     def receiver(self, key: str) -> JointReceiver:
         """Receives a topic."""

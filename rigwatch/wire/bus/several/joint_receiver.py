@@ -62,12 +62,7 @@ class JointReceiver:
                 del self._rigs[share.rig]
 
     def distribute(self) -> None:
-        """Hand out what has come."""
-        with self._lock:
-            self._distribute(None)
-
-    def collect(self) -> None:
-        """The same, but for what the rows take."""
+        """Hand out what has come, but for what the rows take."""
         with self._lock:
             self._distribute(self.rows)
 
