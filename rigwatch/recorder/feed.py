@@ -35,6 +35,7 @@ class Feed:
             later ones are fetched from the ring.
         positions: the same for numbered topics.
         gaps_may_fill: do not publish gaps yet, as another recording may fill them.
+        catch_up: longest time in a turn for messages of the rings [s].
 
     Attributes:
         samples: samples delivered.
@@ -49,7 +50,9 @@ class Feed:
         positions: Positions | None = None,
         *,
         gaps_may_fill: bool = False,
+        catch_up: float = CATCH_UP,
     ) -> None:
+        self._catch_up = catch_up
         self.samples = self.gap_samples = self.foreign_gaps = 0
         self._name = bus.process
         here = not gaps_may_fill
@@ -102,7 +105,7 @@ class Feed:
 
     def _drained(self, subscription: Subscription) -> list[Message]:
         if isinstance(subscription, CompleteSubscription):
-            return subscription.catch_up(CATCH_UP)  # its own gaps are in their place
+            return subscription.catch_up(self._catch_up)  # its own gaps are in their place
         if subscription.topic is GAPS:
             return self._credible(subscription)
         return [message for message in subscription.drain() if not self._is_own(message)]

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from rigwatch.recorder.disk import DiskWatch
 from rigwatch.recorder.disks import Disks, take_turns
-from rigwatch.recorder.feed import Feed
+from rigwatch.recorder.feed import CATCH_UP, Feed
 from rigwatch.recorder.folders import (
     LONGEST_BREAK,
     age_of,
@@ -70,15 +70,21 @@ class Recorder:
         config: the rig's configuration.
         run: description written at the head of every segment.
         bus: source of the messages.
+        catch_up: see `Feed`.
     """
 
-    def __init__(self, config: RigConfig, run: RunInfo, bus: Bus) -> None:
+    def __init__(
+        self, config: RigConfig, run: RunInfo, bus: Bus, catch_up: float = CATCH_UP
+    ) -> None:
         self.settings = config.recorder or RecorderSection()
         root, remote = Path(self.settings.folder), self.settings.remote
         place = choose(root, run, math.inf if remote else LONGEST_BREAK)
         place = of_living(bus, place) if place.changed else place
         self.store = Store(place.folder, run, self.settings.segment)
-        self.feed = RemoteFeed(bus, place) if remote else Feed(bus, place.last, place.positions)
+        if remote:
+            self.feed: Feed = RemoteFeed(bus, place, catch_up)
+        else:
+            self.feed = Feed(bus, place.last, place.positions, catch_up=catch_up)
         self._bus, self._run = bus, run
         self._length = SessionLength(self.settings.session_days, age_of(place.folder, run))
         self._settled = self._noted = 0
@@ -269,7 +275,8 @@ def record(
     root = Path((config.recorder or RecorderSection()).folder)
     kept = Kept(root / f".{config.rig.id}.lock", f"{root}: recording of {config.rig.id}")
     try:
-        recorder = Recorder(config, run, bus)
+        # Others wait for their turns: what rings have is taken as their answers come.
+        recorder = Recorder(config, run, bus, CATCH_UP if disks is None else 0.0)
         pulse.ready(f"recording to {recorder.store.folder}")
         turn = _Turn(recorder, kept, bus, pulse)
         every = recorder.settings.flush * _OF_FLUSH

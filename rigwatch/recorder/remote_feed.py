@@ -54,10 +54,11 @@ class RemoteFeed(Feed):
     Args:
         bus: of a router that is linked to the site's.
         place: where the recording goes on.
+        catch_up: see `Feed`.
     """
 
-    def __init__(self, bus: Bus, place: Place) -> None:
-        super().__init__(bus, place.last, place.positions, gaps_may_fill=True)
+    def __init__(self, bus: Bus, place: Place, catch_up: float = CATCH_UP) -> None:
+        super().__init__(bus, place.last, place.positions, gaps_may_fill=True, catch_up=catch_up)
         self._bus = bus
         self._streams, self._outage = resumed(place)
         self._asked: dict[str, Hole] = {}
@@ -141,7 +142,10 @@ class RemoteFeed(Feed):
         if name == SAMPLES.name:
             found: list[Message] = [*self._reader.read(0.0)]
         else:
-            found = [*self._numbered[name].catch_up(CATCH_UP), *self._numbered[name].reports()]
+            found = [
+                *self._numbered[name].catch_up(self._catch_up),
+                *self._numbered[name].reports(),
+            ]
         return self._reported(stream.add(found))
 
     # ---- from the recordings ------------------------------------------------------------

@@ -1,14 +1,23 @@
 """New content of a configuration, once it has stayed as it is between two looks.
 
 Whoever saves a file may empty it first and write it in parts: a part may be valid, with sections
-missing, and processes that run would be ended for it.
+missing, and processes that run would be ended for it. Files are read again only if the kernel says
+that they have changed: hundreds of rigs are looked at twice a second.
 """
 
 import hashlib
+import time
+from contextlib import suppress
 from pathlib import Path
 
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.rig_config import rig_text
+from rigwatch.wire.typed_files import files_of
+
+CERTAIN_AFTER_NS = 2_000_000_000
+"""Age of a change after which a further one has another time on any file system [ns]."""
+Mark = tuple[int, int, int, int, int]
+"""Disk, number, size, and times of change of a file [ns]."""
 
 
 class SettledFile:
@@ -21,23 +30,48 @@ class SettledFile:
 
     def __init__(self, path: Path, *, known: bool = True) -> None:
         self._path = path
-        self._known = self._seen = hash_of(path) if known else ""
+        self._marks: dict[Path, Mark] = {}
+        self._seen = ""
+        self._known = self._seen = self._hash() if known else ""
 
     def has_new_content(self) -> bool:
         """Whether the content is another than the known one, and that of the last look."""
-        before, self._seen = self._seen, hash_of(self._path)
+        before, self._seen = self._seen, self._hash()
         if self._seen != before or self._seen in (self._known, ""):
             return False
         self._known = self._seen
         return True
 
+    def _hash(self) -> str:
+        """Hash of the content; "" while it cannot be read, as during a save."""
+        if self._is_unchanged():
+            return self._seen
+        try:
+            self._marks = self._certain_marks()
+            return hashlib.sha256(_content(self._path)).hexdigest()
+        except OSError:
+            self._marks = {}
+            return ""
 
-def hash_of(path: Path) -> str:
-    """Hash of a configuration's content; "" while it cannot be read, as during a save."""
-    try:
-        return hashlib.sha256(_content(path)).hexdigest()
-    except OSError:
-        return ""
+    def _is_unchanged(self) -> bool:
+        """Whether the files are certainly as they were when they were read."""
+        with suppress(OSError):
+            return bool(self._marks) and self._marks == {file: _mark(file) for file in self._marks}
+        return False
+
+    def _certain_marks(self) -> dict[Path, Mark]:
+        """Those of the files that are read next; none while they may change without a trace."""
+        try:
+            marks = {file: _mark(file) for file in files_of(self._path)}
+        except ConfigError:
+            return {}
+        changed_ns = max(max(mark[-2:]) for mark in marks.values())
+        return marks if time.time_ns() - changed_ns > CERTAIN_AFTER_NS else {}
+
+
+def _mark(file: Path) -> Mark:
+    found = file.stat()
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
 
 
 def _content(path: Path) -> bytes:

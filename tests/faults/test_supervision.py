@@ -8,17 +8,18 @@ import subprocess
 import sys
 import termios
 import time
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from rigwatch.demo.rig_file import write_rig_file
-from rigwatch.supervisor import RigSet, Supervisor
+from rigwatch.supervisor import RigSet, Supervisor, settled_file
 from rigwatch.supervisor.child import LONGEST_LINE
 from rigwatch.supervisor.rig_set import GONE_AFTER
 from rigwatch.supervisor.settled_file import SettledFile
-from rigwatch.wire.rig_config import load_rig
+from rigwatch.wire.rig_config import load_rig, rig_text
 from rigwatch.wire.typed_files.shipped import find_config
 from tests.monitor_process.test_several import rig_file
 from tests.tooling.test_supervisor import WORKER, of_kind, supervise, worker
@@ -92,6 +93,33 @@ def test_a_file_that_is_being_saved_is_read_once_it_is_whole(tmp_path: Path) -> 
     assert not file.has_new_content()
     path.write_text("[rig]\n[recorder]\n[witness]\n")
     assert not any(file.has_new_content() for _ in range(3)), "as it was"
+
+
+def test_files_that_have_not_changed_are_not_read_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reads = Counter[str]()
+
+    def counted(path: Path) -> str:
+        reads[path.name] += 1
+        return rig_text(path)
+
+    monkeypatch.setattr(settled_file, "rig_text", counted)
+    base, path = tmp_path / "base.toml", tmp_path / "rig.toml"
+    base.write_text("[rig]\n")
+    path.write_text('base = "base.toml"\n')
+    file = SettledFile(path)
+    looks = [file.has_new_content() for _ in range(5)]
+    assert (looks, reads["rig.toml"]) == ([False] * 5, 6), "it has changed just now"
+    monkeypatch.setattr(settled_file, "CERTAIN_AFTER_NS", 0)
+    file.has_new_content()
+    reads.clear()
+    assert not any(file.has_new_content() for _ in range(5))
+    assert not reads
+    base.write_text("[rig]\n[recorder]\n")
+    assert [file.has_new_content() for _ in range(3)] == [False, True, False]
+    base.rename(tmp_path / "other.toml")
+    assert [file.has_new_content() for _ in range(3)] == [False, True, False], "it fits no more"
 
 
 @pytest.fixture

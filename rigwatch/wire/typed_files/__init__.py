@@ -5,7 +5,7 @@ as typed values.
 from rigwatch.wire.typed_files.bounded import loads
 from rigwatch.wire.typed_files.json_values import JsonError, as_json, decoded, json_value
 from rigwatch.wire.typed_files.loading import Section, converted, load, parse, read_text
-from rigwatch.wire.typed_files.overlay import holder, load_layered, whole_text
+from rigwatch.wire.typed_files.overlay import files_of, holder, load_layered, whole_text
 from rigwatch.wire.typed_files.shipped import copy_out, find_config, find_file, shipped_names
 from rigwatch.wire.typed_files.writing import as_toml, quoted
 
@@ -17,6 +17,7 @@ __all__ = [
     "converted",
     "copy_out",
     "decoded",
+    "files_of",
     "find_config",
     "find_file",
     "holder",

@@ -107,6 +107,15 @@ def whole_text(path: Path | str, tag: str = "") -> str:
     return f"# {', over '.join(layer.file.name for layer in layers)}\n{as_toml(tree)}"
 
 
+def files_of(path: Path | str) -> list[Path]:
+    """The file at `path`, its base, the base of that, …
+
+    Raises:
+        ConfigError: as in `read_layers`.
+    """
+    return [layer.file for layer in read_layers(path)]
+
+
 def _layer(path: Path | str) -> Layer:
     text = read_text(Path(path))
     return Layer(Path(path), text, tables(text, path))
