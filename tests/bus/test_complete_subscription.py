@@ -233,6 +233,30 @@ def test_a_listener_that_begins_while_the_router_is_gone_gets_no_old_messages():
     assert heard(listener, 6) == [5, 6]
 
 
+def test_a_ring_that_is_slow_to_say_where_it_is_delays_no_reader(monkeypatch: pytest.MonkeyPatch):
+    network = MemoryNetwork()
+    monitor, reader = network.bus("r", "monitor"), network.bus("r", "listener")
+    say(monitor, range(5))
+    hidden, network.tokens, network.up = network.tokens, [], False
+    listener = reader.subscribe(ALARMS)
+    network.tokens, network.up = hidden, True
+    answers, query = threading.Event(), reader.query
+
+    def slow(key: str, question: bytes = b"", timeout: float = 1.0) -> list[bytes]:
+        answers.wait(PATIENCE)
+        return query(key, question, timeout)
+
+    monkeypatch.setattr(reader, "query", slow)
+    for token in hidden:
+        network.tell(token, True)
+    say(monitor, range(5, 7))
+    looked = threading.Event()
+    threading.Thread(target=lambda: (listener.drain(), looked.set()), daemon=True).start()
+    assert looked.wait(PATIENCE / 2), "the reader waits for the ring"
+    answers.set()
+    assert heard(listener, 6) == [5, 6]
+
+
 def test_messages_of_a_restarted_process_arrive_from_the_first_on_and_the_break_is_reported():
     network = MemoryNetwork()
     gaps = network.bus("r", "observer").subscribe(GAPS)

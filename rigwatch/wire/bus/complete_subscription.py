@@ -91,6 +91,7 @@ class CompleteSubscription(Subscription):
         self._ended: dict[tuple[int, str], float] = {}
         self._assumed: dict[str, int] = {}
         self._unconfirmed: dict[str, list[Token]] = {}
+        self._awaited: dict[str, list[tuple[Token, bool]]] = {}
         self._early = EarlyMessages()
         self._inbox: Inbox[Any] = Inbox(capacity)
         self._ready: deque[bytes | Gap] = deque()  # decoded by the call that returns them
@@ -278,6 +279,9 @@ class CompleteSubscription(Subscription):
             process, ask, replies, _ = incoming
             known = _read(replies, ask.boot)
             best = max(known, key=lambda reply: reply.settled, default=None)
+            if process in self._awaited:
+                self._follow_awaited(process, best)
+                return
             outcomes = self._senders[process].replied(ask, best)
             self._behind = {Numbered, Ask} <= set(map(type, outcomes))
             self._handle(process, outcomes)
@@ -306,6 +310,9 @@ class CompleteSubscription(Subscription):
 
     def _take_token(self, token: "Token", alive: bool) -> None:
         process, run, since_ns, sender = token
+        if process in self._awaited:
+            self._awaited[process].append((token, alive))
+            return
         if process not in self._senders and not (alive and self._follow_new(token)):
             return
         peer = self._senders[process]
@@ -335,18 +342,45 @@ class CompleteSubscription(Subscription):
                 del self._runs[gone]
 
     def _follow_new(self, token: "Token") -> bool:
-        """Follow a process whose token was not seen at the start; an older run from now on."""
+        """Follow a process whose token was not seen at the start; an older run from now on.
+
+        False if it is not followed, or not yet: where an older run is, its ring has to say.
+        """
         process, run, since_ns, _ = token
-        last = -1
-        if since_ns < self._began_ns:
-            early = self._early.first_of(run)
-            last = self._newest(process, run) if early is None else early - 1
-        return self._follow(process, (run, last))
+        if since_ns >= self._began_ns:
+            return self._follow(process, (run, -1))
+        early = self._early.first_of(run)
+        if early is not None:
+            return self._follow(process, (run, early - 1))
+        if self._has_room_for(process):
+            # Whoever reads here, perhaps for many rigs in turns, does not wait for an answer.
+            self._awaited[process] = [(token, True)]
+            self._early.token(process, named=False, alive=True)
+            self._questions.ask(ring_key(process, self.topic), Ask(run, OPEN, OPEN))
+        return False
+
+    def _follow_awaited(self, process: str, newest: RingReply[Numbered] | None) -> None:
+        """The ring of a process has said what its newest message is, or has not answered."""
+        tokens = self._awaited.pop(process)
+        self._early.token(process, named=True, alive=True)
+        run = tokens[0][0][1]
+        early = self._early.first_of(run)
+        gone = not all(alive for _, alive in tokens)
+        if early is not None or newest is not None or not gone:  # else nothing was ever heard of it
+            last = early - 1 if early is not None else newest.settled if newest is not None else -1
+            self._follow(process, (run, last))
+            for token, alive in tokens:
+                self._take_token(token, alive)
+        self._take_early()
+
+    def _has_room_for(self, process: str) -> bool:
+        # Strangers that come first leave room for those who say alarms.
+        followed = len(self._senders) + len(self._awaited)
+        return followed < MOST_SENDERS or process in alarm_roles()
 
     def _follow(self, process: str, place: Place) -> bool:
         """Follow a further process, unless the limit is reached."""
-        # Strangers that come first leave room for those who say alarms.
-        if len(self._senders) >= MOST_SENDERS and process not in alarm_roles():
+        if not self._has_room_for(process):
             return False
         self._senders[process] = Sender(place, patient=self._patient)
         return True
