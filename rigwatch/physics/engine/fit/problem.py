@@ -498,6 +498,26 @@ class Problem:
         both = tangent.without(np.concatenate([error[..., None], slopes[..., :m]], axis=-1))
         return -both[..., 0].ravel(), both[..., 1:].reshape(error.size, m)
 
+    @cached_property
+    def measured_count(self) -> float:
+        """Residuals that samples determine: what is missing, or pads a recording, tells nothing.
+
+        A decimated residual mixes samples; as many of them count as of the samples that they mix.
+        """
+        known, outputs = float(np.sum(np.isfinite(self.measured))), self.measured.shape[2]
+        if self.recording.thinning is None:
+            return known
+        kept = sum(self._lengths) * outputs if self._cut.parts else self.count
+        return known / (sum(self.lengths) * outputs) * kept
+
+    def freedom(self, slopes: FloatArray) -> float:
+        """Residuals that samples determine, less the initial states that these determine.
+
+        Args:
+            slopes: as in `Started`, of all windows.
+        """
+        return self.measured_count - self._tangent(slopes, np.arange(len(slopes))).rank
+
 
 def _later(error: FloatArray) -> IntArray:
     """Windows, except the first, in which something is left."""
