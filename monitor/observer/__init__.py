@@ -23,7 +23,7 @@ from monitor.observer.decision.decision_state import (
     DecisionRules,
     new_state,
 )
-from monitor.observer.lagged_motion import EMPTY, MATCHED, motion_kernel
+from monitor.observer.lagged_motion import EMPTY, FIRST, MATCHED, motion_kernel
 from monitor.observer.missing_force import (
     DISAGREE,
     DRY_UNIT,
@@ -67,6 +67,7 @@ __all__ = [
     "DRY_UNIT",
     "EMPTY",
     "EVIDENCE",
+    "FIRST",
     "LASTING",
     "MATCHED",
     "MEASURED",

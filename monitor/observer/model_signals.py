@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from monitor.drives import BANDS, DriveBands, DriveChanges, DriveStops, InputSteps, Steps
-from monitor.model import EquationsPlant, RemainderSection
+from monitor.drives import DriveBands, DriveChanges, DriveStops, InputSteps, Steps
+from monitor.model import BANDS, EquationsPlant, RemainderSection
 from monitor.observer.lagged_motion import (
     DELAY,
     EMPTY,
