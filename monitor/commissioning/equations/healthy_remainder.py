@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from monitor.commissioning.equations.described import TRAINED, Left, described, rms
+from monitor.commissioning.equations.described import TRAINED, Left, described, rms, with_pauses
 from monitor.commissioning.equations.fitted_equations import admitted
 from monitor.commissioning.unhealthy import check_healthy, white_noise
 from monitor.model import (
@@ -60,7 +60,7 @@ def healthy_remainder(
     slow = slow_speed(later, layout, plant)
     noise = min(white_noise(one.channel(layout.channels[-1])) for one in used)
     left = [
-        Left(one.name, one.role, o.judged, spectrum_of(o, layout, slow, rate).pace, noise)
+        Left(one.name, one.role, with_pauses(o), spectrum_of(o, layout, slow, rate).pace, noise)
         for one, o in zip(used, later, strict=True)
     ]
     del later
