@@ -42,7 +42,6 @@ from monitor.observer.model_signals import (
     Observed,
     ObserverSignals,
     layout_of,
-    remainder_signals,
 )
 from monitor.observer.prediction import (
     SETTLING,
@@ -115,7 +114,6 @@ __all__ = [
     "range_of",
     "range_signals",
     "rate_columns",
-    "remainder_signals",
     "steady_motion",
     "terms",
 ]

@@ -45,7 +45,7 @@ def diverging(every: int, share: float = 0.03) -> Observed:
     judged[state == EMPTY] = 0.0
     none = np.zeros((N, 0))
     predicted = Predicted(none, none, reset)
-    return Observed(state, none, measured, predicted, judged, none, none, none)
+    return Observed(state, none, measured, predicted, judged, none, none, none, none)
 
 
 @pytest.mark.parametrize(("every", "left"), [(4000, 0.08), (400, 0.29), (80, 0.63)])

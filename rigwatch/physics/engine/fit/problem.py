@@ -491,10 +491,15 @@ class Problem:
             self._best = _Best(size, parameters.copy(), self.initial)
         return found
 
-    def cleaned(self, error: FloatArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def tangent(self, slopes: FloatArray) -> Tangent:
+        """The influence of the initial states of all windows; `slopes` as in `Started`."""
+        return self._tangent(slopes, np.arange(len(slopes)))
+
+    def cleaned(
+        self, error: FloatArray, slopes: FloatArray, tangent: Tangent | None = None
+    ) -> tuple[FloatArray, FloatArray]:
         """Residual and Jacobian with the influence of the initial states projected out."""
-        m = len(self.free)
-        tangent = self._tangent(slopes, np.arange(len(slopes)))
+        m, tangent = len(self.free), tangent or self.tangent(slopes)
         both = tangent.without(np.concatenate([error[..., None], slopes[..., :m]], axis=-1))
         return -both[..., 0].ravel(), both[..., 1:].reshape(error.size, m)
 
@@ -509,14 +514,6 @@ class Problem:
             return known
         kept = sum(self._lengths) * outputs if self._cut.parts else self.count
         return known / (sum(self.lengths) * outputs) * kept
-
-    def freedom(self, slopes: FloatArray) -> float:
-        """Residuals that samples determine, less the initial states that these determine.
-
-        Args:
-            slopes: as in `Started`, of all windows.
-        """
-        return self.measured_count - self._tangent(slopes, np.arange(len(slopes))).rank
 
 
 def _later(error: FloatArray) -> IntArray:

@@ -309,7 +309,8 @@ def covariance_of(jacobian: FloatArray, variance: float) -> FloatArray:
 def result_of(problem: Problem, found: Started) -> Fit:
     """The fit at the parameters found."""
     error, scale = found.error, problem.scale
-    residual, jacobian = problem.cleaned(error, found.slopes)
+    tangent = problem.tangent(found.slopes)
+    residual, jacobian = problem.cleaned(error, found.slopes, tangent)
     curvature = jacobian.T @ jacobian
     if not np.isfinite(curvature).all():
         raise ModelError(
@@ -318,7 +319,7 @@ def result_of(problem: Problem, found: Started) -> Fit:
         )
     outputs, m = problem.measured.shape[2], len(problem.free)
     counted = problem.whole_recording(error.reshape(len(error), -1, outputs))
-    freedom = max(problem.freedom(found.slopes) - m, 1.0)
+    freedom = max(problem.measured_count - tangent.rank - m, 1.0)
     covariance = covariance_of(jacobian, float(residual @ residual) / freedom)
     left = counted * scale
     if problem.recording.thinning is None:
