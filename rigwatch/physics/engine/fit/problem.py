@@ -513,7 +513,7 @@ class Problem:
         if self.recording.thinning is None:
             return known
         kept = sum(self._lengths) * outputs if self._cut.parts else self.count
-        return known / (sum(self.lengths) * outputs) * kept
+        return float(known / (sum(self.lengths) * outputs) * kept)
 
 
 def _later(error: FloatArray) -> IntArray:
