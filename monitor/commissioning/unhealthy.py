@@ -15,19 +15,29 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from monitor.observer import DRY_UNIT, E
+from monitor.observer import DRY_UNIT, MEDIUM, E
 from monitor.signals import Recording
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
-SECONDS, MOVES = 5.0, 5.0
-"""Minimum length of a recording [s], and of its motion in standard deviations of the noise."""
+SECONDS, STARTED = 5.0, 2.0
+"""Minimum length of a recording, and start of it whose spectrum is transient [s]."""
+MOVES = 5.0
+"""Minimum size of its motion in standard deviations of the noise."""
 BLOCK, SETTLED = 128, 512
 """Samples per estimate, and samples skipped at the start."""
 LEAST = 3
 """Minimum number of blocks on either side of a step, and of recordings to single one out."""
 STEP = 2.5
 """Ratio of a friction step to the remaining residual above which a recording is refused."""
+
+
+def least_samples(rate: float) -> int:
+    """Samples from which limits can be taken, of a recording or of what is kept of it.
+
+    They are the largest figures over windows of samples, of which a slow rate has few in a second.
+    """
+    return max(round(SECONDS * rate), round(STARTED * rate) + 2 * MEDIUM)
 
 
 def check_moves(recordings: Sequence[Recording], shown: Sequence[str]) -> None:
@@ -41,11 +51,12 @@ def check_moves(recordings: Sequence[Recording], shown: Sequence[str]) -> None:
         ModelError: a recording is short, or a channel contains only noise.
     """
     for one in recordings:
-        seconds = len(one.channel(shown[0])) / one.sample_rate
-        if seconds < SECONDS:
+        samples, rate = len(one.channel(shown[0])), one.sample_rate
+        if samples < least_samples(rate):
             raise ModelError(
-                f"{one.name}: found {seconds:.1f} s of samples without a gap, expected at least"
-                f" {SECONDS:g} s with the excitation running: record longer"
+                f"{one.name}: found {samples / rate:.1f} s of samples without a gap, expected at"
+                f" least {least_samples(rate) / rate:g} s with the excitation running: record"
+                " longer"
             )
         for name in shown:
             signal = one.channel(name)

@@ -12,7 +12,6 @@ from monitor.drives.jittered_edges import JitteredEdges
 from monitor.drives.jittered_steps import Jittered, JitteredSteps
 from monitor.drives.read_instants import follow_instants, no_instants, still_unsure
 from monitor.drives.recorded_drives import (
-    BANDS,
     DriveBands,
     RecordedDrives,
     same_drive,
@@ -22,7 +21,6 @@ from monitor.drives.sliding_edges import Moved, SlidingEdges
 from monitor.drives.sliding_steps import Sliding, SlidingSteps
 
 __all__ = [
-    "BANDS",
     "BridgedEdges",
     "Drive",
     "DriveBands",

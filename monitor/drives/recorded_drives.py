@@ -9,13 +9,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from monitor.model import BANDS
 from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes, fill
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kernel import kernel
 
-TIMES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+TIMES = tuple(2.0**octave for octave in range(BANDS - 1))
 """Time constants of the low-passes between bands [samples]."""
-BANDS = len(TIMES) + 1
 MEMORY = 128.0
 """Samples over which energies are averaged; a tone leaves a ripple."""
 ALIKE, FAINT = 0.1, 0.01

@@ -19,6 +19,7 @@ from monitor.model.model_file import (
     parse_model,
 )
 from monitor.model.observer_sections import (
+    BANDS,
     EquationsPlant,
     HealthyLimits,
     RangeSection,
@@ -27,6 +28,7 @@ from monitor.model.observer_sections import (
 )
 
 __all__ = [
+    "BANDS",
     "BandSection",
     "DecisionSection",
     "EquationsPlant",

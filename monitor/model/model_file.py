@@ -4,12 +4,14 @@
 back gives the same estimates to the last bit.
 """
 
+import math
 from pathlib import Path
 from typing import Annotated
 
 from msgspec import Meta, field, structs
 
 from monitor.model.observer_sections import (
+    BANDS,
     EquationsPlant,
     HealthyLimits,
     RangeSection,
@@ -273,6 +275,44 @@ def _check_equations(model: RigModel, path: Path | str) -> None:
     ):
         if len(values) != expected:
             raise ConfigError(path, key, f"{len(values)} values", f"{expected} values")
+    assert model.healthy is not None
+    _check_steady_motions(model.healthy, path)
+
+
+def _check_steady_motions(healthy: HealthyLimits, path: Path | str) -> None:
+    """Check that every steady motion has all its figures, or that none has some of them."""
+    motions = len(healthy.steady_paces)
+    for key, of_each in _OF_EACH_MOTION.items():
+        values = getattr(healthy, key)
+        # Files of earlier versions have pace, size, narrowness and lasting energy only.
+        if len(values) != of_each * motions and (values or key in _OF_EVERY_VERSION):
+            found, expected = f"{len(values)} values", f"{of_each * motions} values"
+            raise ConfigError(path, f"healthy.{key}", found, expected)
+    if len(healthy.steady_drive_energies) % BANDS:
+        found = f"{len(healthy.steady_drive_energies)} values"
+        raise ConfigError(path, "healthy.steady_drive_energies", found, f"{BANDS} for each drive")
+    for key in (*_OF_EACH_MOTION, "steady_drive_energies"):
+        # The shape of a motion may be unknown.
+        values = [value for value in getattr(healthy, key) if not math.isfinite(value)]
+        if values and not (key == "steady_skews" and all(map(math.isnan, values))):
+            raise ConfigError(path, f"healthy.{key}", f"{values[0]}", "finite values")
+
+
+_OF_EVERY_VERSION = ("steady_sizes", "steady_narrow", "steady_energies")
+_OF_EACH_MOTION = {
+    "steady_paces": 1,
+    "steady_sizes": 1,
+    "steady_narrow": 1,
+    "steady_drives": 1,
+    "steady_motion_bands": BANDS,
+    "steady_energies": 1,
+    "steady_shorts": 1,
+    "steady_mediums": 1,
+    "steady_frictions": 1,
+    "steady_onsets": 1,
+    "steady_skews": 3,
+}
+"""Figures of a steady healthy motion, and how many of each."""
 
 
 _COLUMNS = ("voltage", "position", "acceleration", "modelled")

@@ -88,6 +88,10 @@ class RangeSection(Section, frozen=True, kw_only=True):
     ] = ()
 
 
+BANDS = 7
+"""Bands in which the energy of a drive is kept."""
+
+
 class HealthyLimits(Section, frozen=True, kw_only=True):
     """Size and extremes of the healthy residual."""
 

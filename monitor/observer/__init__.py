@@ -23,7 +23,7 @@ from monitor.observer.decision.decision_state import (
     DecisionRules,
     new_state,
 )
-from monitor.observer.lagged_motion import EMPTY, MATCHED, motion_kernel
+from monitor.observer.lagged_motion import EMPTY, FIRST, MATCHED, motion_kernel
 from monitor.observer.missing_force import (
     DISAGREE,
     DRY_UNIT,
@@ -42,7 +42,6 @@ from monitor.observer.model_signals import (
     Observed,
     ObserverSignals,
     layout_of,
-    remainder_signals,
 )
 from monitor.observer.prediction import (
     SETTLING,
@@ -67,6 +66,7 @@ __all__ = [
     "DRY_UNIT",
     "EMPTY",
     "EVIDENCE",
+    "FIRST",
     "LASTING",
     "MATCHED",
     "MEASURED",
@@ -114,7 +114,6 @@ __all__ = [
     "range_of",
     "range_signals",
     "rate_columns",
-    "remainder_signals",
     "steady_motion",
     "terms",
 ]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from monitor.drives import BANDS, DriveBands, DriveChanges, DriveStops, InputSteps, Steps
-from monitor.model import EquationsPlant, RemainderSection
+from monitor.drives import DriveBands, DriveChanges, DriveStops, InputSteps, Steps
+from monitor.model import BANDS, EquationsPlant, RemainderSection
 from monitor.observer.lagged_motion import (
     DELAY,
     EMPTY,
@@ -118,6 +118,7 @@ class Observed:
             that is not known yet, shape (n,).
         drive: pace of the first input, see `monitor.drives.Drive`, shape (n,).
         bands: energies of the first input, see `monitor.drives.DriveBands`, shape (n, bands).
+        arguments: of the remainder: motion and hidden states, shape (n, signals).
     """
 
     state: Codes
@@ -128,6 +129,7 @@ class Observed:
     steady: BoolArray
     drive: FloatArray
     bands: FloatArray
+    arguments: FloatArray
 
     def part(self, begin: int, end: int) -> "Observed":
         """Samples `begin` to before `end`."""
@@ -135,6 +137,7 @@ class Observed:
         return Observed(
             self.state[at], self.rows[at], self.measured[at], self.predicted.part(at),
             self.judged[at], self.steady[at], self.drive[at], self.bands[at],
+            self.arguments[at],
         )  # fmt: skip
 
 
@@ -237,7 +240,7 @@ class ObserverSignals:
             ]
         )  # fmt: skip
         z, *changed = (
-            remainder_signals(rows, predicted.states[:, run], self.layout)
+            _arguments(rows, predicted.states[:, run], self.layout)
             for run in (Run.PLAIN, *WITH_OTHER_INPUTS)
         )
         judged = self._high_passed.update(raw, z, np.stack(changed), state)
@@ -251,9 +254,9 @@ class ObserverSignals:
         pace = drives[0].pace if drives else np.zeros(code.size)
         energies = [own.update(signals[:, 0], code) for own in self._bands]
         bands = energies[0] if energies else np.zeros((code.size, BANDS))
-        return Observed(state, rows, measured, predicted, judged, steady, pace, bands)
+        return Observed(state, rows, measured, predicted, judged, steady, pace, bands, z)
 
 
-def remainder_signals(rows: FloatArray, hidden: FloatArray, layout: Layout) -> FloatArray:
+def _arguments(rows: FloatArray, hidden: FloatArray, layout: Layout) -> FloatArray:
     """Motion and hidden states, the arguments of the remainder, shape (n, signals)."""
     return np.ascontiguousarray(np.hstack([rows[:, list(layout.motions)], hidden]))

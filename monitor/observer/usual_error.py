@@ -19,8 +19,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from monitor.drives import BANDS, same_drive
-from monitor.model import HealthyLimits
+from monitor.drives import same_drive
+from monitor.model import BANDS, HealthyLimits
 from monitor.observer.spectral_width import MEMORY, Spectrum
 from rigwatch.wire.arrays import FloatArray
 

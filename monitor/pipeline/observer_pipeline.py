@@ -32,7 +32,6 @@ from monitor.observer import (
     friction_limit,
     information_matrix,
     levels,
-    remainder_signals,
 )
 from monitor.observer import decision_state as d
 from monitor.pipeline.promoted import check_can_follow
@@ -122,8 +121,8 @@ class ObserverMonitor:
         assert remainder is not None
         grown = levels(seen.rows[:, list(layout.motions)], seen.judged[:, PREDICTED], remainder)
         if self._terms is not None:
-            z = remainder_signals(seen.rows, seen.predicted.hidden, layout)
-            grown = np.ascontiguousarray(np.hstack([grown, self._terms.update(z, seen.state)]))
+            unsure = self._terms.update(seen.arguments, seen.state)
+            grown = np.ascontiguousarray(np.hstack([grown, unsure]))
         speed = np.ascontiguousarray(seen.rows[:, layout.speed])
         inside = (far <= 1.0) | self._recorded.contain(seen.bands)
         known = self.model.motion_range

@@ -13,7 +13,6 @@ from monitor.reference.reference_state import (
     ARMED,
     STRETCHES,
     Reference,
-    ReferenceRules,
 )
 from monitor.signals import fill_rows
 from rigwatch.wire.arrays import FloatArray
@@ -24,9 +23,9 @@ APERIODIC_CYCLE = 256
 
 
 @part()
-def learn_aperiodic(ref: Reference, rules: ReferenceRules, row: FloatArray) -> None:
+def learn_aperiodic(ref: Reference, length: int, row: FloatArray) -> None:
     """Accumulate Σa², Σa·am, Σam², Σx² and ΣV² of each stretch; one sample per call."""
-    stretch = ref.counts.learnt // rules.learn
+    stretch = ref.counts.learnt // length
     a, am = row[2], row[3]
     ref.sums[0, stretch] += a * a
     ref.sums[1, stretch] += a * am
@@ -34,12 +33,10 @@ def learn_aperiodic(ref: Reference, rules: ReferenceRules, row: FloatArray) -> N
     ref.sums[3, stretch] += row[1] * row[1]
     ref.products[4] += row[0] * row[0]
     ref.counts.learnt += 1
-    if ref.counts.learnt >= STRETCHES * rules.learn:
-        _arm_aperiodic(ref, rules.learn)
 
 
 @part(allocates=True)
-def _arm_aperiodic(ref: Reference, length: int) -> None:
+def arm_aperiodic(ref: Reference, length: int) -> None:
     """Arm for an aperiodic drive; limits come from stretches of `length` samples."""
     total, learnt = np.zeros(4), ref.counts.learnt
     for i in range(4):

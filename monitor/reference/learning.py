@@ -15,6 +15,8 @@ An aperiodic excitation has no such average; see `aperiodic.py`.
     SETTLING ──settled, period found──▶ LEARNING ──enough periods, quiet──▶ ARMED
         ▲    ──a reference of the model file fits and agrees─────────────────▲
         └─────────── another excitation, or a new boot ────────────────────────┘
+
+Where more than a quarter of the samples are missing, it begins to settle, or to learn, again.
 """
 
 # Compiled functions are untyped to mypy.
@@ -22,7 +24,7 @@ An aperiodic excitation has no such average; see `aperiodic.py`.
 
 import numpy as np
 
-from monitor.reference.aperiodic import learn_aperiodic
+from monitor.reference.aperiodic import arm_aperiodic, learn_aperiodic
 from monitor.reference.averages import FEWEST_OF_A_PLACE, average, enough_known
 from monitor.reference.reference_state import (
     APERIODIC,
@@ -35,6 +37,7 @@ from monitor.reference.reference_state import (
     NO_REFERENCE,
     RESUMING,
     SETTLING,
+    STRETCHES,
     Reference,
     ReferenceRules,
 )
@@ -42,14 +45,18 @@ from monitor.signals import fill, fill_rows
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import part
 
+MOST_MISSING = 4
+"""Share of the samples, as a divisor, that may be missing while a reference is learnt."""
+
+FEWEST_PAIRS = 4
+"""Share of the pairs of samples a period apart, as a divisor, that must be known."""
+
 
 @part()
 def restart(ref: Reference, new_boot: bool) -> None:
     """Settle again after a reset of the filters; discard the reference if its phase is lost."""
-    ref.counts.since = 0
-    ref.counts.ring_fill = 0
-    ref.counts.ring_head = 0
-    ref.counts.learnt = 0
+    _settle_again(ref)
+    ref.counts.learnt = ref.counts.unlearnt = 0
     keeps = ref.counts.mode in (ARMED, RESUMING)
     ref.counts.mode = RESUMING if keeps and not new_boot else SETTLING
     if ref.counts.mode == SETTLING:
@@ -78,12 +85,9 @@ def observe(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) ->
     if counts.mode == RESUMING:
         if counts.since >= rules.settle:
             counts.mode = ARMED
-    elif counts.mode == SETTLING and rules.fixed:
-        if counts.since >= rules.settle:
-            _arm_fixed(ref, rules)
     elif counts.mode == SETTLING:
-        if counts.since >= rules.settle and counts.since % 16 == 0:
-            _look_for_period(ref, rules, seq)
+        if counts.since >= rules.settle and (rules.fixed or counts.since % 16 == 0):
+            _settled(ref, rules, seq)
     elif counts.mode == LEARNING:
         _learn(ref, rules, seq, row)
 
@@ -92,8 +96,40 @@ def observe(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) ->
 def pass_over(ref: Reference) -> None:
     """Process one missing sample before the reference is armed, so that places keep their time."""
     _remember(ref, np.nan)
-    if ref.counts.mode == LEARNING and ref.counts.source == FROM_RUN:
-        ref.counts.learnt += 1
+    if ref.counts.mode == LEARNING:
+        ref.counts.unlearnt += 1
+        if ref.counts.source == FROM_RUN:
+            ref.counts.learnt += 1
+
+
+@part()
+def _settled(ref: Reference, rules: ReferenceRules, seq: int) -> None:
+    """Begin to learn, or settle again if the line has lost too many samples."""
+    if not _few(ref.counts.ring_missing, ref.counts.ring_fill):
+        _settle_again(ref)
+    elif rules.fixed:
+        _arm_fixed(ref, rules)
+    else:
+        _look_for_period(ref, rules, seq)
+
+
+@part(inline="always")
+def _few(missing: int, samples: int) -> bool:
+    """Whether so few samples are missing that those between them are as on a sound line.
+
+    Without a reference they are interpolated. The filters follow what is guessed, and a reference
+    that is learnt of guesses departs from the rig as soon as its own periods fill the gaps.
+    """
+    return missing * MOST_MISSING <= samples
+
+
+@part()
+def _settle_again(ref: Reference) -> None:
+    """Forget the samples seen since the last restart."""
+    ref.counts.since = 0
+    ref.counts.ring_fill = 0
+    ref.counts.ring_head = 0
+    ref.counts.ring_missing = 0
 
 
 @part()
@@ -107,8 +143,9 @@ def _arm_fixed(ref: Reference, rules: ReferenceRules) -> None:
 
 
 @part()
-def _forget_sums(ref: Reference) -> None:
-    """Begin to learn."""
+def _learn_again(ref: Reference) -> None:
+    """Forget what was learnt."""
+    ref.counts.learnt = ref.counts.unlearnt = 0
     fill_rows(ref.sums, 0.0)
     fill(ref.products, 0.0)
     fill(ref.seen, 0)
@@ -117,6 +154,10 @@ def _forget_sums(ref: Reference) -> None:
 @part()
 def _remember(ref: Reference, voltage: float) -> None:
     size = ref.ring.size
+    if ref.counts.ring_fill == size and np.isnan(ref.ring[ref.counts.ring_head]):
+        ref.counts.ring_missing -= 1
+    if np.isnan(voltage):
+        ref.counts.ring_missing += 1
     ref.ring[ref.counts.ring_head] = voltage
     ref.counts.ring_head = (ref.counts.ring_head + 1) % size
     ref.counts.ring_fill = min(ref.counts.ring_fill + 1, size)
@@ -161,27 +202,31 @@ def _look_for_period(ref: Reference, rules: ReferenceRules, seq: int) -> None:
 
 @part()
 def _repeats(ref: Reference, period: int, count: int, tolerance: float) -> bool:
-    """Whether the voltage repeats after `period`; stops at the first contradiction."""
-    total = 0.0
+    """Whether the voltage repeats after `period`; stops at the first contradiction.
+
+    Of a line that loses samples, few two that far apart may be known: they show nothing.
+    """
+    total, known = 0.0, 0
     for n in range(count):
         moved = _past(ref, n) - _past(ref, n + period)
         if not np.isnan(moved):
             total += moved**2
+            known += 1
         if total > tolerance * count:
             return False
-    return True
+    return known * FEWEST_PAIRS >= count and total <= tolerance * known
 
 
 @part()
 def _found(ref: Reference, rules: ReferenceRules, seq: int, period: int, swing: float) -> None:
     counts, levels = ref.counts, ref.levels
     counts.period, counts.anchor = period, seq + 1
-    counts.learnt, counts.depth = 0, 0
+    counts.depth = 0
     levels.swing = swing
     levels.noise = rules.residual_noise
     levels.position_noise = rules.position_noise
     levels.voltage_noise = rules.voltage_noise
-    _forget_sums(ref)
+    _learn_again(ref)
     counts.mode = LEARNING
     counts.source = FROM_RUN
     for index in range(ref.known_period.size):
@@ -228,8 +273,7 @@ def _take_known(ref: Reference, index: int, period: int, turn: int, seq: int) ->
 def _learn(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> None:
     counts, period = ref.counts, ref.counts.period
     if period == 1:
-        learn_aperiodic(ref, rules, row)
-        ref.seen[0] = FEWEST_OF_A_PLACE
+        _learn_level(ref, rules, row)
         return
     place = place_in_period(ref, seq)
     for i in range(4):
@@ -242,8 +286,23 @@ def _learn(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> 
     ref.products[4] += row[0] * row[0]
     counts.learnt += 1
     wanted = max(4, (rules.learn + period - 1) // period) * period
-    if counts.learnt >= wanted and enough_known(ref):
+    if counts.learnt >= wanted and not _few(counts.unlearnt, counts.learnt):
+        _learn_again(ref)
+    elif counts.learnt >= wanted and enough_known(ref):
         _finish_learning(ref, rules, wanted // period)
+
+
+@part()
+def _learn_level(ref: Reference, rules: ReferenceRules, row: FloatArray) -> None:
+    """Process one sample of an aperiodic drive."""
+    counts = ref.counts
+    learn_aperiodic(ref, rules.learn, row)
+    ref.seen[0] = FEWEST_OF_A_PLACE
+    if counts.learnt >= STRETCHES * rules.learn:
+        if _few(counts.unlearnt, counts.learnt + counts.unlearnt):
+            arm_aperiodic(ref, rules.learn)
+        else:
+            _learn_again(ref)
 
 
 @part(allocates=True)
@@ -251,7 +310,7 @@ def _finish_learning(ref: Reference, rules: ReferenceRules, depth: int) -> None:
     """Compute averages, amplitude scale and scatter; restart if the rig has not settled."""
     counts, levels, period = ref.counts, ref.levels, ref.counts.period
     average(ref)
-    counts.depth = depth
+    counts.depth, counts.refined = depth, 0
     aa = am = mm = xx = vv = 0.0
     # Energies of the averages over whole periods, and over the samples beyond or short of them.
     more, moreover = np.zeros(5), 0
@@ -289,8 +348,7 @@ def _finish_learning(ref: Reference, rules: ReferenceRules, depth: int) -> None:
     if quiet:
         counts.mode = ARMED
     else:
-        counts.learnt = 0
-        _forget_sums(ref)
+        _learn_again(ref)
 
 
 @part()
@@ -344,5 +402,8 @@ def refine(ref: Reference, place: int, row: FloatArray) -> None:
     gain = 1.0 / (ref.counts.depth + 1)
     for i in range(4):
         ref.template[i, place] += gain * (row[i] - ref.template[i, place])
-    if place == period - 1:
+    # A line may never show the last place of the period.
+    ref.counts.refined += 1
+    if ref.counts.refined >= period:
+        ref.counts.refined = 0
         ref.counts.depth += 1

@@ -20,9 +20,12 @@ _COUNTS = np.dtype(
         ("period", np.int64),  # [samples]
         ("anchor", np.int64),  # sample number of the period's first place
         ("learnt", np.int64),  # samples
+        ("unlearnt", np.int64),  # samples missing since the learning began
         ("ring_fill", np.int64),  # of the ring of voltages
         ("ring_head", np.int64),
+        ("ring_missing", np.int64),  # samples of the ring that are missing
         ("depth", np.int64),  # periods averaged
+        ("refined", np.int64),  # samples of the next one
         ("cycle", np.int64),  # one to and fro of the mass [samples]
     ]
 )

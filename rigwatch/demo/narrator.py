@@ -38,13 +38,13 @@ _STATEMENTS = re.compile(r"(\w+@\w+) (\(.*?\)): (explains [^;]*)(?:;(.*))?", re.
 WIDTH = 88
 """Longest line of a statement, without its margin [characters]."""
 ENDED = ("normal", "cleared_unacknowledged")
-NAMELESS = "departure"
+NAMELESS, UNKNOWN = "departure", "other_fault"
 """The alarm that reports a fault without naming it."""
 AFTER_EXPLAINED = 8.0
 """Time from the naming of dry friction to the end if its cause is told by then [s]."""
-NAMED = {NAMELESS: "alarm raised", "other_fault": "dry friction ruled out"}
+NAMED = {NAMELESS: "alarm raised", UNKNOWN: "dry friction ruled out"}
 """What an alarm tells at its time, if that is not the fault's name."""
-OF_THE_RIG = (NAMELESS, "dry_friction", "stiction", "other_fault")
+OF_THE_RIG = (NAMELESS, "dry_friction", "stiction", UNKNOWN)
 """Alarms that answer to what is done to the rig; others are about its measuring chain."""
 OF_THE_CHAIN = (
     "(about the measuring chain, and none of the faults announced: on a busy machine the simulated",
@@ -232,7 +232,8 @@ class Narrator:
         if alarm.name == NAMELESS and NAMELESS not in self._told:
             self._say("            (something has changed; what it is follows as a second alarm)")
         if alarm.name != NAMELESS and self._unnamed is not None:
-            self._say(f"            (this names the fault behind {self._called(self._unnamed)})")
+            names = "tells that no dry friction is" if alarm.name == UNKNOWN else "names the fault"
+            self._say(f"            (this {names} behind {self._called(self._unnamed)})")
         self._unnamed = alarm if alarm.name == NAMELESS else None
 
     def _advise(self, alarm: Alarm) -> None:

@@ -63,6 +63,8 @@ class Witness:
         kept: keeps the witness's own alarm over restarts.
         said: keeps what it has said for its next run.
         lease: silence after which a link to the router counts as broken [s].
+        awaited: whether the rig has a monitor; of one that has none, silence is no alarm before
+            a monitor has been heard.
 
     Raises:
         ConfigError: a heartbeat output or the file of people is invalid.
@@ -79,6 +81,7 @@ class Witness:
         *,
         said: SaidAlarms | None = None,
         lease: float = 10.0,
+        awaited: bool = True,
     ) -> None:
         self._security = security = security or SecuritySection()
         self.settings, self._bus = settings, bus
@@ -94,7 +97,7 @@ class Witness:
         self._check = CommandCheck(bus, security)
         self._stale = StaleAlarm(self._check, kept)
         # An alarm of an earlier run ends with an estimate, not with the patience for the first.
-        self._unheard = self._stale.holds
+        self._unheard, self._awaited = self._stale.holds, awaited
         self._commands = bus.subscribe(COMMANDS)
         self._told_at = now - 1.0
         self._knows_standing = False
@@ -107,13 +110,14 @@ class Witness:
         # Of a structure that is watched on the same rig they say nothing about the monitor.
         if not all(map(is_of_structure, self._estimates.drain())):
             self._silence.end(now)
-            self._unheard = False
+            self._unheard, self._awaited = False, True
             if not self._knows_standing and now - self._asked_at >= ASKED_AGAIN:
                 self._learn_standing(now)
         silent = self._silence.counted(now)
-        stale = self._unheard or silent > self._stale_after
+        stale = self._awaited and (self._unheard or silent > self._stale_after)
         doubled = self._doubles.text(now)
-        for alarm in self._stale.judge(stale, silent, t_ns, self._link_trouble, doubled):
+        why = {} if self._awaited else {"ended": "this rig has no monitor"}
+        for alarm in self._stale.judge(stale, silent, t_ns, self._link_trouble, doubled, **why):
             self._bus.publish(ALARMS, alarm)
         self._obey(t_ns)
         for alarm in self._alarms.drain():
@@ -207,6 +211,7 @@ def run(config: RigConfig, stop: threading.Event) -> None:
             kept,
             said=SaidAlarms(path and path.with_name(f"{path.name}.said"), kept.read()),
             lease=config.bus.lease,
+            awaited=config.monitor is not None,
         )
         heartbeat = Heartbeat(PROCESS)
         keep_memory_tidy(stop)

@@ -35,13 +35,14 @@ class StaleAlarm:
         self.standing = self._kept.read()
         self._check = check
 
-    def judge(
+    def judge(  # noqa: PLR0917 -- all that is known
         self,
         stale: bool,
         silent: float,
         t_ns: int,
         why: Callable[[], str] = str,
         doubled: str = "",
+        ended: str = "the one monitor is heard again",
     ) -> Iterator[Alarm]:
         """The transition, if there is one.
 
@@ -51,6 +52,7 @@ class StaleAlarm:
             t_ns: Unix time [ns].
             why: asked for the reason when the alarm is raised; "" if none is known.
             doubled: that several processes call themselves monitor; "" if not.
+            ended: why the alarm ends, if it does.
         """
         if (stale or doubled) and not self.holds:
             reason = why()
@@ -59,7 +61,7 @@ class StaleAlarm:
         elif not (stale or doubled) and self.standing is not None and self.holds:
             seen = self.standing.state == "acknowledged"
             state: AlarmState = "normal" if seen else "cleared_unacknowledged"
-            yield self._become(_alarm(state, "the one monitor is heard again", t_ns))
+            yield self._become(_alarm(state, ended, t_ns))
 
     @property
     def holds(self) -> bool:

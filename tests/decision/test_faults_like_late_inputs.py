@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from monitor.drives import BANDS
-from monitor.model import HealthyLimits
+from monitor.model import BANDS, HealthyLimits
 from monitor.observer import (
     Extremes,
     SpectralWidth,

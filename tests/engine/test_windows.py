@@ -8,7 +8,7 @@ from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import Model, shipped_models
 from rigwatch.physics.engine.equations.system import Placement, compose
 from rigwatch.physics.engine.fit.problem import Problem
-from rigwatch.physics.engine.fit.recording import Recording
+from rigwatch.physics.engine.fit.recording import Recording, initial_states
 from rigwatch.physics.engine.fit.windowed_fit import evaluate, fit
 from rigwatch.physics.engine.score.candidates import shaped
 from rigwatch.physics.engine.score.effect_sensitivities import directions
@@ -161,3 +161,28 @@ def test_a_lag_and_a_spring_that_hardens_are_fitted_together_wherever_the_lag_be
     assert found.values()["drive_lag_tau"] == pytest.approx(0.02, rel=0.01)
     assert found.values()["load_cubic_stiffness_k3"] == pytest.approx(2000.0, rel=0.05)
     assert (found.rms < 1.1 * noise).all()
+
+
+@pytest.mark.parametrize("whole", [False, True], ids=["samples", "windows"])
+def test_missing_samples_are_no_evidence(whole):
+    """Nor are the initial states of windows without a sample: nothing determines them."""
+    rng, noise = np.random.default_rng(4), 0.05
+    command = rng.normal(size=(4096, 1)).repeat(8, axis=0)[:4096]
+    seen = followed(command[:, 0]) + noise * rng.normal(size=4096)
+    windows = rng.random(4096 // 32).repeat(32) if whole else rng.random(4096)
+    seen[windows < 0.6] = np.nan
+    compiled = compile_system(compose(parse(FOLLOWER, Model, "follower")))
+    found = fit(compiled, Recording(DT, command, seen[:, None]), 32)
+    slopes = found.jacobian.ravel() * found.scale[0]
+    assert found.deviations()["w"] == pytest.approx(noise / np.linalg.norm(slopes), rel=0.05)
+    left = float(np.sum((found.error * found.scale) ** 2))
+    assert left / found.freedom == pytest.approx(noise**2, rel=0.1)
+
+
+def test_a_gap_at_the_join_of_two_recordings_is_not_bridged():
+    """What the last sample of one shows is nothing about the first of the other."""
+    seen = np.concatenate([np.full(50, 1.0), np.full(50, 5.0)])
+    seen[45:60] = np.nan
+    system = compose(parse(FOLLOWER, Model, "follower"))
+    found = initial_states(system, Recording(DT, np.zeros((100, 1)), seen[:, None], parts=(50, 50)))
+    assert found[:, 0].tolist() == [1.0] * 50 + [5.0] * 50

@@ -1,5 +1,7 @@
 """A serial line that loses single samples: a healthy rig raises nothing, and friction is named."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from monitor.pipeline.pipeline import PUBLISHED, Monitor, Result
 from monitor.signals import conditions as kinds
 from rigwatch.wire.messages.message_types import Column, SampleBlock
 from rigwatch.wire.messages.quality_flags import NON_FINITE
-from sim_plant.excitation import Shape, Square, Triangle
+from sim_plant.excitation import Shape, Sine, Square, Triangle
 from tests.monitor.monitor_rig import (
     OTHER_SINE,
     RATE,
@@ -23,9 +25,16 @@ from tests.monitor.monitor_rig import (
 SQUARE = Square(amplitude=1.0, frequency=8.0)
 TRIANGLE = Triangle(amplitude=1.4, frequency=4.0)
 DRIVES = {"known": SINE, "learnt": OTHER_SINE, "square": SQUARE, "triangle": TRIANGLE}
+SLOW_SINE = Sine(amplitude=1.2, frequency=5.0)
 PERIOD = 32
 """Samples of a period of the faster drives."""
 Gaps = list[tuple[int, int]]
+
+
+@cache
+def learnt_sine() -> dict[str, np.ndarray]:
+    """A healthy run with a drive that the model does not know."""
+    return run(OTHER_SINE, 11.0, seed=35)
 
 
 def parts(channels: dict[str, np.ndarray], gaps: Gaps) -> list[SampleBlock]:
@@ -84,6 +93,48 @@ def test_a_place_that_was_never_seen_is_learnt_when_the_line_is_mended() -> None
     assert results[-2].estimates.column("armed").values[-1] == 1.0
     assert not raised(results, kinds.DEPARTURE).any()
     assert results[-1].estimates.column("observable").values[-1] == 1.0
+
+
+@pytest.mark.parametrize("lost", range(PERIOD))
+def test_an_average_is_completed_whichever_place_of_the_period_is_lost_from_now_on(
+    lost: int,
+) -> None:
+    whole, monitor, armed = learnt_sine(), Monitor(model()), 704
+    begun = []
+    for part in parts(whole, [(first, 1) for first in range(armed + lost, 2560, PERIOD)])[:-1]:
+        monitor.update(part)
+        begun.append(int(monitor._reference.counts.depth))
+    assert begun[0] > 0
+    # Samples beside a lost one do not count either.
+    assert begun[-1] - begun[0] > 0.75 * (2560 - armed) / PERIOD
+
+
+@pytest.mark.parametrize("drive", [OTHER_SINE, TRIANGLE, SLOW_SINE], ids=["sine", "tri", "slow"])
+def test_a_line_that_loses_every_third_sample_is_not_learnt_until_it_is_mended(
+    drive: Shape,
+) -> None:
+    channels = run(drive, 21.0, friction(19.0), seed=31)
+    mended, onset = int(12.0 * RATE), int(19.0 * RATE)
+    results = watched([held(channels, [(k, 1) for k in range(0, mended, 3)])])
+    armed = results[0].estimates.column("armed").values
+    assert not armed[:mended].any()
+    # A slow drive repeats after a second, and is learnt for four.
+    assert armed[onset - 1] == 1.0
+    for name in (kinds.DEPARTURE, kinds.OTHER_FAULT, kinds.DRY_FRICTION):
+        assert not raised(results, name)[:onset].any(), name
+    assert raised(results, kinds.DRY_FRICTION)[-1] == 1
+
+
+@pytest.mark.parametrize("step", [5, 6, 7])
+def test_a_line_that_loses_samples_has_the_period_of_a_sound_one(step: int) -> None:
+    """What repeats nearly after 32 samples does not so much better because few are compared."""
+    channels = run(Sine(amplitude=1.2, frequency=RATE / 32.0355), 10.0, seed=31)
+    found = []
+    for gaps in ([], [(k, 1) for k in range(3, 2000, step)]):
+        monitor = Monitor(model())
+        monitor.update(held(channels, gaps))
+        found.append(int(monitor._reference.counts.period))
+    assert found[1] == found[0]
 
 
 def held(channels: dict[str, np.ndarray], gaps: Gaps) -> SampleBlock:

@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from monitor.commissioning.equations.described import Left, described
-from monitor.observer import MEASURED, E
+from monitor.commissioning.equations.described import Left, described, with_pauses
+from monitor.observer import EMPTY, FIRST, MEASURED, E, Observed
+from monitor.observer.lagged_motion import WHOLE
+from monitor.observer.prediction import PAUSE, Predicted
 from rigwatch.wire.errors import ModelError
 
 RATE, SECONDS = 256.0, 40
@@ -29,6 +31,35 @@ def sweep(worst: float, above: float = 12.0) -> Left:
 
 def tone(hertz: float, share: float = 0.03) -> Left:
     return recording("healthy", np.full(N, hertz), np.full(N, share))
+
+
+def diverging(every: int, share: float = 0.03) -> Observed:
+    """A tone whose equations diverge after so many samples, and begin anew after a pause."""
+    one, place = tone(8.0, share), np.arange(N)
+    state, reset = np.full(N, WHOLE), place % every == every - 1
+    for end in np.flatnonzero(reset):
+        state[end : end + PAUSE] = EMPTY
+        state[end + PAUSE : end + PAUSE + 1] = FIRST
+    state[0] = FIRST
+    measured, judged = one.judged[:, MEASURED] + 0.5, one.judged.copy()
+    judged[state == EMPTY] = 0.0
+    none = np.zeros((N, 0))
+    predicted = Predicted(none, none, reset)
+    return Observed(state, none, measured, predicted, judged, none, none, none, none)
+
+
+@pytest.mark.parametrize(("every", "left"), [(4000, 0.08), (400, 0.29), (80, 0.63)])
+def test_equations_that_diverge_describe_nothing_until_they_begin_anew(
+    every: int, left: float
+) -> None:
+    seen = diverging(every)
+    found = replace(tone(8.0), judged=with_pauses(seen))
+
+    assert found.share(0, N) == pytest.approx(left, rel=0.1)
+    if left > 0.2:
+        with pytest.raises(ModelError, match="of a healthy recording"):
+            described([found], "rig", RATE)
+    assert np.array_equal(with_pauses(diverging(N + 1)), diverging(N + 1).judged)
 
 
 def test_what_is_described_is_kept_whole() -> None:

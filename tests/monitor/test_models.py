@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 from scipy.io import loadmat
 from scipy.stats import chi2
 
@@ -99,6 +100,45 @@ def test_values_that_are_missing_from_a_model_of_equations_are_reported(
     path.write_text(path.read_text().replace(old, new, 1), encoding="utf-8")
     with pytest.raises(ConfigError, match=says):
         load_model(path)
+
+
+STEADY = {
+    "paces": (8.0, 4.0), "sizes": (1.0, 2.0), "narrow": (1.5, 1.2), "energies": (1.1, 1.2),
+    "drives": (0.4, 0.2), "shorts": (2.0, 2.1), "mediums": (1.5, 1.6), "frictions": (3.0, 3.1),
+    "onsets": (2.5, 2.6), "motion_bands": (0.1,) * 14, "skews": (np.nan,) * 6,
+    "drive_energies": (0.1,) * 21,
+}  # fmt: skip
+
+
+def with_steady(**figures: tuple[float, ...]) -> RigModel:
+    """The model with figures of steady motions; a model of equations has no others."""
+    found, named = of_equations(), {f"steady_{key}": own for key, own in figures.items()}
+    assert found.healthy is not None
+    return structs.replace(found, healthy=structs.replace(found.healthy, **named))
+
+
+def test_figures_of_steady_motions_are_read_back(tmp_path: Path) -> None:
+    earlier = {key: STEADY[key] for key in ("paces", "sizes", "narrow", "energies")}
+    for known in (STEADY, earlier):
+        again = load_model(saved(with_steady(**known), tmp_path))
+        assert again.healthy is not None
+        assert again.healthy.steady_sizes == (1.0, 2.0)
+
+
+@pytest.mark.parametrize("key", STEADY)
+@pytest.mark.parametrize("value", [None, np.inf, -np.inf])
+def test_a_figure_of_a_steady_motion_that_is_missing_or_infinite_is_reported(
+    tmp_path: Path, key: str, value: float | None
+) -> None:
+    rest = STEADY[key][:-1] if value is None else (*STEADY[key][:-1], value)
+    with pytest.raises(ConfigError, match=r"healthy\.steady_"):
+        load_model(saved(with_steady(**STEADY | {key: rest}), tmp_path))
+
+
+@pytest.mark.parametrize("key", ["sizes", "narrow", "energies"])
+def test_a_steady_motion_has_the_figures_of_every_version(tmp_path: Path, key: str) -> None:
+    with pytest.raises(ConfigError, match=rf"healthy\.steady_{key}"):
+        load_model(saved(with_steady(**STEADY | {key: ()}), tmp_path))
 
 
 def test_a_line_of_the_history_that_a_kill_has_torn_takes_no_later_one_with_it(

@@ -49,6 +49,13 @@ def test_a_short_recording_is_refused_with_what_to_do() -> None:
         check_moves([moving], ["position"])
 
 
+def test_at_a_slow_rate_a_recording_holds_the_windows_of_which_limits_are_the_largest() -> None:
+    moving = recording_of("healthy", "slow", 10.0, {"position": np.sin(np.arange(60) / 2.0)})
+
+    with pytest.raises(ModelError, match=r"slow: found 6\.0 s .* at least 8\.4 s .*record longer"):
+        check_moves([moving], ["position"])
+
+
 def test_a_recording_at_rest_is_refused_with_its_channel_and_ordinary_motion_is_not() -> None:
     rng = np.random.default_rng(4)
     noise = 1e-5 * rng.standard_normal(SAMPLES)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from monitor.commissioning.equations.healthy_limits import HealthyPart, healthy_limits
-from monitor.drives import BANDS
+from monitor.model import BANDS
 from monitor.observer import Spectrum
 from monitor.observer.lagged_motion import WHOLE
 from monitor.observer.missing_force import (

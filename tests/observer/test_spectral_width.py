@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from monitor.drives import BANDS
-from monitor.model import HealthyLimits, RigModel
+from monitor.model import BANDS, HealthyLimits, RigModel
 from monitor.observer import Extremes, SpectralWidth, Spectrum, UsualError, steady_motion
 from monitor.observer.lagged_motion import FIRST, WHOLE
 from monitor.pipeline.rig_monitor import RigMonitor

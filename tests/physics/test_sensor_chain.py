@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 from msgspec.structs import replace
+from scipy.optimize import minimize_scalar
+from scipy.signal import lfilter, lsim
 
+from monitor.commissioning.equations.sensor_chain import (
+    CORNER,
+    SETTLED,
+    fit_sensor,
+    sensor_parameters,
+)
+from monitor.observer import high_pass
 from rigwatch.physics.engine.equations import Model, along_measured_motion, check_model
 from rigwatch.physics.engine.equations.measured_motion import predicted_outputs
 from rigwatch.physics.engine.equations.model import Output, shipped_models
@@ -54,6 +63,33 @@ def test_a_sensor_names_a_parameter_of_the_model() -> None:
 
     with pytest.raises(ModelError, match=r"outputs.acceleration.corner: found 'w0', expected"):
         check_model(wrong)
+
+
+def test_a_stated_value_of_a_sensor_is_not_fitted_beside_its_others() -> None:
+    """A high-pass with a gain: of a stated gain, the corner is the one that leaves least."""
+    model, rate, stated = shipped_models()["servo-pneumatic"], 256.0, 0.7
+    gain = replace(model.parameters["wa"], unit="1", shown="", value=1.0, low=0.1, high=10.0)
+    mean = replace(model.states["mean"], derivative="wa*(ga*acceleration - mean)")
+    parameters = model.parameters | {"ga": gain}
+    model = replace(model, states=model.states | {"mean": mean}, parameters=parameters)
+    assert sensor_parameters(model) == {"wa", "ga"}
+    time = np.arange(20.0 * rate) / rate
+    motion = np.sin(2 * np.pi * 0.8 * time) + np.sin(2 * np.pi * 2.3 * time)
+
+    def shown(corner: float, gain: float) -> np.ndarray:
+        return motion - lsim(([corner * gain], [1.0, corner]), motion, time)[1]
+
+    measured = shown(4.0, 1.0)
+    found = fit_sensor(model, [(np.zeros((len(time), 3)), measured, motion)], rate, {"ga": stated})
+    assert list(found) == ["wa"]
+
+    def left(corner: float) -> float:
+        error = lfilter(*high_pass(CORNER, rate), shown(corner, stated) - measured)
+        return float(np.sum(2 * (np.sqrt(1 + error[round(SETTLED * rate) :] ** 2) - 1)))
+
+    best = minimize_scalar(left, bounds=(1.0, 20.0), method="bounded").x
+    assert best != pytest.approx(4.0, rel=0.1)
+    assert found["wa"] == pytest.approx(best, rel=0.02)
 
 
 def with_pressure(*, first: bool) -> Model:

@@ -263,6 +263,15 @@ def test_an_alarm_that_names_the_fault_of_an_earlier_one_says_so() -> None:
     assert not any("this names" in line for line in said)
 
 
+def test_an_alarm_that_rules_friction_out_names_nothing() -> None:
+    said: list[str] = []
+    narrator = narrator_to(said)
+    narrator.alarm(alarm("departure", 20 * RATE))
+    narrator.alarm(alarm("other_fault", 21 * RATE))
+    told = [line.strip() for line in said if "behind" in line]
+    assert told == ["(this tells that no dry friction is behind the alarm of 20.00 s)"]
+
+
 def test_no_line_of_an_explanation_is_longer_than_the_others() -> None:
     said: list[str] = []
     rivals = "; ".join(["dahl@load explains as much, and neither is settled"] * 4)

@@ -17,8 +17,10 @@ from rigwatch.wire.messages import (
     ALARMS,
     ESTIMATES,
     MONITOR_STALE,
+    STATISTIC,
     Alarm,
     AlarmCommand,
+    Column,
     EstimateBlock,
     Event,
 )
@@ -87,6 +89,28 @@ def test_a_witness_that_was_held_up_blames_the_monitor_only_if_it_stays_silent()
     assert told_at(13.0, 13.1, 19.0, 19.5, 20.0, 20.5, 21.0) == [20.0]
     # A disk that holds up each turn is no excuse.
     assert told_at(30.0, 32.0, 34.0, 36.0) == [34.0]
+
+
+def test_a_rig_without_a_monitor_has_none_that_is_silent(tmp_path: Path) -> None:
+    """As one on which only a structure is watched, until a monitor has been heard all the same."""
+    network, kept = MemoryNetwork(), KeptAlarm(tmp_path / "alarms.jsonl.stale")
+    structure, monitor = network.bus("r", "structure"), network.bus("r", "monitor")
+    shown = network.bus("r", "dashboard").subscribe(ALARMS)
+    kept.write(fault(MONITOR_STALE))  # of a run in which it had one
+    bus = network.bus("r", "witness")
+    witness = Witness(WitnessSection(), bus, 0.0, kept=kept, awaited=False)
+    watched = EstimateBlock("r", 7, 0, np.zeros(1, np.int64), (Column(STATISTIC, "", np.zeros(1)),))
+    for second in range(60):
+        structure.publish(ESTIMATES, watched)
+        witness.turn(float(second), 1)
+    found = shown.drain()
+    assert [(one.state, one.cause) for one in found] == [
+        ("cleared_unacknowledged", "this rig has no monitor")
+    ]
+    monitor.publish(ESTIMATES, estimates(1))
+    for tenth in range(30):
+        witness.turn(60.0 + tenth / 10, 1)
+    assert [one.state for one in shown.drain()] == ["unacknowledged"]
 
 
 def test_a_monitor_that_is_not_heard_for_want_of_a_router_says_so() -> None:

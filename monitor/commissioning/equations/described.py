@@ -15,8 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from monitor.observer import MEASURED, E
-from rigwatch.wire.arrays import FloatArray
+from monitor.commissioning.unhealthy import STARTED, least_samples
+from monitor.observer import FIRST, MEASURED, E, Observed
+from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
 
 WORST = 0.2
@@ -31,8 +32,6 @@ WINDOW = 1.0
 """Time over which residual and frequency are taken [s]."""
 TRAINED = 2.0 / 3.0
 """Share of each recording used to fit the remainder; the rest judges it."""
-LEAST, STARTED = 5.0, 2.0
-"""Length of what is kept of a recording, and start of it whose spectrum is transient [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +92,30 @@ class Described:
 def rms(signal: FloatArray) -> float:
     """Root mean square."""
     return float(np.sqrt(np.mean(signal**2)))
+
+
+def with_pauses(seen: Observed) -> FloatArray:
+    """Judged columns of a recording, where all is left of what is measured while nothing is judged.
+
+    After the equations have diverged they pause. Without a residual there, they would describe a
+    recording the better the more often they diverge.
+    """
+    judged, paused = seen.judged.copy(), _paused(seen)
+    if paused.any():
+        shown = np.nan_to_num(seen.measured)
+        shown -= shown[paused].mean() if paused.all() else shown[~paused].mean()
+        judged[paused, MEASURED] = judged[paused, E] = shown[paused]
+    return judged
+
+
+def _paused(seen: Observed) -> BoolArray:
+    """Samples from a divergence to where the equations begin anew, shape (n,)."""
+    place = np.arange(len(seen.state))
+    diverged, begun = (
+        np.maximum.accumulate(np.where(at, place, -1))
+        for at in (seen.predicted.reset, seen.state == FIRST)
+    )
+    return np.asarray(diverged > begun)
 
 
 def described(recordings: Sequence[Left], model: str, rate: float) -> Described:
@@ -167,4 +190,4 @@ def _slower(one: Left, fastest: float, rate: float) -> tuple[int, int]:
     slow[: round(STARTED * rate)] = True
     ends = np.flatnonzero(np.diff(np.concatenate([[0], slow, [0]])))
     begin, end = max(zip(ends[::2], ends[1::2], strict=True), key=lambda run: run[1] - run[0])
-    return (int(begin), int(end)) if end - begin >= LEAST * rate else (0, 0)
+    return (int(begin), int(end)) if end - begin >= least_samples(rate) else (0, 0)

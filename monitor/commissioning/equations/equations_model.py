@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from msgspec.structs import replace
 
-from monitor.commissioning.equations.described import STARTED
 from monitor.commissioning.equations.healthy_limits import HealthyPart, healthy_limits
 from monitor.commissioning.equations.healthy_remainder import SKIPPED, slow_speed, spectrum_of
 from monitor.commissioning.equations.unseen_motion import largest_unseen
+from monitor.commissioning.unhealthy import STARTED
 from monitor.model import (
     EquationsPlant,
     FrictionSection,

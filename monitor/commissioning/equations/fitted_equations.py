@@ -5,11 +5,10 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from scipy.signal import savgol_coeffs
 
-from monitor.commissioning.equations.described import STARTED
 from monitor.commissioning.equations.healthy_fit import Stretches
 from monitor.commissioning.equations.sensor_chain import fit_sensor
 from monitor.commissioning.equations.variant_search import fit_with_variants
-from monitor.commissioning.unhealthy import white_noise
+from monitor.commissioning.unhealthy import STARTED, white_noise
 from monitor.model import (
     EquationsPlant,
 )
@@ -66,8 +65,8 @@ def fitted_equations(  # noqa: PLR0917 -- all that is known
         for one, each in zip(used, jitters, strict=True)
     ]
     n = layout.inputs
-    known = fit_sensor(model, [(m[:, :n], m[:, n], m[:, n + 1]) for m in moved], rate)
-    known |= stated
+    motions = [(m[:, :n], m[:, n], m[:, n + 1]) for m in moved]
+    known = fit_sensor(model, motions, rate, stated) | dict(stated)
     parts = [(np.ascontiguousarray(m[:, :n]), np.ascontiguousarray(m[:, [n]])) for m in moved]
     fitted = [round((CHIRP if one.role == "chirp" else FITTED) * rate) for one in used]
     turn = TURNS * _speed_noise(used, layout, lag, rate)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from monitor.commissioning.equations.described import TRAINED, Left, described, rms
+from monitor.commissioning.equations.described import TRAINED, Left, described, rms, with_pauses
 from monitor.commissioning.equations.fitted_equations import admitted
 from monitor.commissioning.unhealthy import check_healthy, white_noise
 from monitor.model import (
@@ -24,7 +24,6 @@ from monitor.observer import (
     high_pass,
     layout_of,
     no_remainder,
-    remainder_signals,
 )
 from monitor.signals import Recording
 from rigwatch.wire.arrays import FloatArray
@@ -47,7 +46,7 @@ def healthy_remainder(
     size = ObserverSignals(plant, no_remainder(0), rate).remainder_size
     bare = _observed(used, plant, no_remainder(size), rate, jitters)
     filters, skip = high_pass(plant.corner, rate), round(SKIPPED * rate)
-    pairs = [(remainder_signals(o.rows, o.predicted.hidden, layout), o.judged[:, E]) for o in bare]
+    pairs = [(o.arguments, o.judged[:, E]) for o in bare]
     del bare  # a recording's signals, of which six simulations, are a hundred columns
     earlier = [(z[: _split(z)], e[: _split(z)]) for z, e in pairs]
     later = _observed(
@@ -60,7 +59,7 @@ def healthy_remainder(
     slow = slow_speed(later, layout, plant)
     noise = min(white_noise(one.channel(layout.channels[-1])) for one in used)
     left = [
-        Left(one.name, one.role, o.judged, spectrum_of(o, layout, slow, rate).pace, noise)
+        Left(one.name, one.role, with_pauses(o), spectrum_of(o, layout, slow, rate).pace, noise)
         for one, o in zip(used, later, strict=True)
     ]
     del later

@@ -6,7 +6,7 @@ before the plant's own, as they could otherwise bias each other.
 """
 
 import ast
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from msgspec.structs import replace
@@ -50,25 +50,31 @@ def sensor_parameters(model: Model) -> frozenset[str]:
 
 
 def fit_sensor(
-    model: Model, recordings: Sequence[tuple[FloatArray, FloatArray, FloatArray]], rate: float
+    model: Model,
+    recordings: Sequence[tuple[FloatArray, FloatArray, FloatArray]],
+    rate: float,
+    stated: Mapping[str, float],
 ) -> dict[str, float]:
-    """Values of the sensor's parameters; none if the model has no sensor equations.
+    """Values of the sensor's parameters that are not known; none without sensor equations.
 
     Args:
         model: the unmodified model.
         recordings: for each, rows of inputs and motion, measured output, and rate of the motion.
         rate: sample rate [Hz].
+        stated: values that are known, in SI: the others are those of a sensor with them.
     """
-    names = sorted(sensor_parameters(model))
-    behind = _behind_the_balance(model, frozenset(names))
+    every = sensor_parameters(model)
+    names = sorted(every - set(stated))
+    behind = _behind_the_balance(model, every)
     if not names or behind is None:
         return {}
     compiled = compile_system(compose(behind))
+    known = {name: stated[name] for name in every & set(stated)}
     start = np.array([state.start for state in behind.states.values()])[None, :]
     filters = high_pass(CORNER, rate)
 
     def left(logs: FloatArray) -> FloatArray:
-        p = compiled.vector(dict(zip(names, np.exp(logs).tolist(), strict=True)))
+        p = compiled.vector(known | dict(zip(names, np.exp(logs).tolist(), strict=True)))
         found = []
         for rows, measured, motion in recordings:
             inputs = np.ascontiguousarray(np.column_stack([0.0 * rows, motion]))

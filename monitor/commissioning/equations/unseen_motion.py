@@ -25,7 +25,6 @@ from monitor.observer import (
     high_pass,
     layout_of,
     levels,
-    remainder_signals,
     terms,
 )
 from rigwatch.wire.arrays import FloatArray
@@ -91,7 +90,7 @@ def _relative_energies(
     assert isinstance(model.plant, EquationsPlant)
     assert model.remainder is not None
     layout, filters = _layout(model), high_pass(model.plant.corner, model.sample_rate)
-    signals = [remainder_signals(o.rows, o.predicted.hidden, layout) for o in parts]
+    signals = [o.arguments for o in parts]
     bare = [
         o.judged[:, E] + _described(model.remainder, z, filters)
         for o, z in zip(parts, signals, strict=True)

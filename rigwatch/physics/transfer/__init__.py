@@ -5,6 +5,7 @@ The thesis's friction-free model is `fit_transfer_function` over a measured freq
 excitation.
 """
 
+from rigwatch.physics.transfer.derivative import Derivative
 from rigwatch.physics.transfer.frequency_fit import fit_transfer_function
 from rigwatch.physics.transfer.frequency_response import FrequencyResponse, frequency_response
 from rigwatch.physics.transfer.lateness import SensorPhase, lateness, sensor_phase
@@ -18,6 +19,7 @@ from rigwatch.physics.transfer.transfer_function import Filter, TransferFunction
 from rigwatch.physics.transfer.velocity import velocity_filter
 
 __all__ = [
+    "Derivative",
     "Filter",
     "FrequencyResponse",
     "OutputErrorFit",

@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from rigwatch.physics.engine.fit import SAME_SPACING, filled
+from rigwatch.physics.transfer import Derivative
 from rigwatch.wire.arrays import FloatArray
 
 
@@ -21,6 +22,7 @@ class Columns:
         altered: how the samples differ from what was measured, in words.
         passed: frequency up to which signals keep their noise, over the rate: neither low-passed
             nor interpolated away.
+        derived: how channels were derived from measured ones; those that were not are missing.
     """
 
     dt: float
@@ -28,6 +30,7 @@ class Columns:
     units: Mapping[str, str] = field(default_factory=dict)
     altered: tuple[str, ...] = ()
     passed: float = 0.5
+    derived: Mapping[str, Derivative] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(next(iter(self.values.values())))

@@ -5,8 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
+from rigwatch.physics.transfer import Derivative
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError, nearest
 from rigwatch.wire.messages import Column, SampleBlock
@@ -119,20 +119,17 @@ def with_derived(columns: Columns, derive: Derive | None) -> Columns:
             f"derive: found a recording of {len(columns)} samples, expected at least {PADDED + 1}"
             " for its low-pass"
         )
-    sections = butter(4, derive.low_pass, fs=rate, output="sos")
-    found = dict(columns.values)
+    found, derived = dict(columns.values), dict(columns.derived)
     for name, signal in derive.signals.items():
         if signal.channel not in columns.values:
             raise ModelError(
                 f"derive: found channel {signal.channel!r}{nearest(signal.channel, columns.values)}"
             )
         raw = columns.values[signal.channel]
-        smooth = sosfiltfilt(sections, bridged(raw))
-        for _ in range(signal.order):
-            smooth = np.gradient(smooth, columns.dt)
-        found[name] = np.where(np.isfinite(raw), smooth, np.nan)
+        derived[name] = Derivative(derive.low_pass, signal.order, rate)
+        found[name] = np.where(np.isfinite(raw), derived[name].of(bridged(raw)), np.nan)
     units = {**columns.units, **_derived_units(columns, derive)}
-    return replace(columns, values=found, units=units)
+    return replace(columns, values=found, units=units, derived=derived)
 
 
 def _derived_units(columns: Columns, derive: Derive) -> dict[str, str]:

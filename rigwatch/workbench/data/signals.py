@@ -242,7 +242,13 @@ def _recording(
     ends = [name for name, held in study.holds.items() if held.ends]
     passed = min(table.passed for table in tables)
     dt, spacings = of_parts([table.dt for table in tables], parts)
-    made = Recording(dt, u, y, thinning, parts, passed=passed, breaks=breaks, spacings=spacings)
+    derived = tuple(
+        tables[0].derived.get(_channel(study, name, output))
+        for name, output in study.model.outputs.items()
+    )
+    made = Recording(
+        dt, u, y, thinning, parts, passed=passed, breaks=breaks, spacings=spacings, derived=derived
+    )
     return with_next_rows(study.model, made, ends)
 
 
@@ -260,11 +266,16 @@ def _beyond(use: str, spans: Sequence[float], share: float, horizon: float) -> s
     )
 
 
+def _channel(study: Study, name: str, signal: Input | Output) -> str:
+    """Name of the channel of a signal of the model."""
+    return study.file.channels.get(name, signal.channel or name)
+
+
 def _matched(study: Study, table: Columns) -> tuple[FloatArray, FloatArray]:
-    model, file = study.model, study.file
+    model = study.model
 
     def column(name: str, signal: Input | Output) -> FloatArray:
-        wanted = file.channels.get(name, signal.channel or name)
+        wanted = _channel(study, name, signal)
         if wanted not in table.values:
             raise ModelError(
                 f"{model.name}: found no channel {wanted!r} for {name}"

@@ -30,6 +30,9 @@ from rigwatch.workbench.study import Study
 
 MAX_DIFFERENCE = 0.2
 """Largest rms difference between an excitation and the healthy one, over its standard deviation."""
+DRIFT, CLOCK = 0.25, 1e-3
+"""Samples by which rounded periods may be off at the end of a recording, and their relative
+difference from the stated ones that may be the clock's."""
 FEWEST = 2
 """Number of healthy periods needed, so that each can be compared with another."""
 
@@ -79,7 +82,7 @@ def with_healthy_reference(
         data,
         train=_with_reference(data.train, np.nanmean(periods.left, axis=0)),
         held_out=_with_reference(data.held_out, np.nanmean(judged.left, axis=0)),
-        healthy=_leave_one_out(alone.train.dt, judged),
+        healthy=_leave_one_out(alone.train, judged),
         remarks=(*data.remarks, remark),
     )
 
@@ -87,7 +90,11 @@ def with_healthy_reference(
 def _matching(study: Study, bare: Fitted, recording: Recording, data: Data, use: str) -> _Periods:
     healthy, horizon = data.healthy, data.horizon
     assert healthy is not None
-    period = round(study.file.period / recording.dt) or find_period(recording) or len(recording)
+    period = (
+        _whole_periods(study.file.period / recording.dt, horizon, len(recording))
+        or find_period(recording)
+        or len(recording)
+    )
     if period % horizon:
         raise ModelError(
             f"{use}: found a period of {period} samples, expected a multiple of the horizon"
@@ -102,6 +109,28 @@ def _matching(study: Study, bare: Fitted, recording: Recording, data: Data, use:
     rows = starts[:, None] + np.arange(period)
     left = [_left(bare, healthy, row, horizon) for row in rows]
     return _Periods(healthy.inputs[rows], healthy.outputs[rows], np.array(left))
+
+
+def _whole_periods(period: float, horizon: int, samples: int) -> int:
+    """Samples of as many periods as are whole horizons; 0 if no number of them is.
+
+    Rounded, they come too early or late by more and more in a recording: the first number of
+    periods counts for which that is `DRIFT` at its end at most, else the best of `CLOCK`.
+
+    Args:
+        period: in samples, not whole in general; 0 if it is not known.
+        horizon: samples of a window.
+        samples: of the recording.
+    """
+    if period <= 0.0:
+        return 0
+    several = period * np.arange(1, int(samples / period) + 1)
+    whole = np.rint(several)
+    off = np.where(whole % horizon == 0, np.abs(whole - several) / several, np.inf)
+    if not np.any(off <= CLOCK):
+        return 0
+    first = np.flatnonzero(off <= max(DRIFT / samples, off.min()))[0]
+    return int(whole[first])
 
 
 def _starts(period: FloatArray, signals: FloatArray) -> FloatArray:
@@ -139,9 +168,16 @@ def _unlike(period: FloatArray, signal: FloatArray) -> FloatArray:
 
 
 def _left(bare: Fitted, healthy: Recording, row: FloatArray, horizon: int) -> FloatArray:
-    part = Recording(healthy.dt, healthy.inputs[row], healthy.outputs[row])
+    part = _of_samples(healthy, healthy.inputs[row], healthy.outputs[row])
     residuals = evaluate(bare.train, part, horizon, bare.substeps).residuals
     return np.asarray(residuals.reshape(len(row), -1))
+
+
+def _of_samples(recording: Recording, inputs: FloatArray, outputs: FloatArray) -> Recording:
+    """One stretch of other samples, which are what the recording's are."""
+    return Recording(
+        recording.dt, inputs, outputs, passed=recording.passed, derived=recording.derived
+    )
 
 
 def _with_inputs(model: Model) -> Model:
@@ -168,11 +204,11 @@ def _with_reference(recording: Recording, reference: FloatArray) -> Recording:
     )
 
 
-def _leave_one_out(dt: float, periods: _Periods) -> Recording:
+def _leave_one_out(healthy: Recording, periods: _Periods) -> Recording:
     """Each healthy period with the mean residual of the others as its reference."""
     count = len(periods.left)
     others = (np.sum(periods.left, axis=0) - periods.left) / (count - 1)
     inputs, outputs, flat = (
         a.reshape(-1, a.shape[-1]) for a in (periods.inputs, periods.outputs, others)
     )
-    return _with_reference(Recording(dt, inputs, outputs), flat)
+    return _with_reference(_of_samples(healthy, inputs, outputs), flat)

@@ -55,9 +55,8 @@ def profile(fitted: Fitted, recording: Recording) -> dict[str, Value]:
         width = float(np.sqrt(robust[index, index]))
         swelling = robust[index, index] / max(train.covariance[index, index], 1e-300)
         best = float(np.sum(train.error**2))
-        used = max(train.error.size - train.jacobian.shape[-1] - train.initial.size, 1)
         deviations = float(student.ppf(0.5 + CONFIDENCE / 2, degrees[index]))
-        allowed = deviations**2 * best / used * swelling
+        allowed = deviations**2 * best / train.freedom * swelling
         search = _Search(train, recording, fitted.horizon, fitted.substeps, allowed, best)
         ends = [_end(search, name, sign * deviations * width) for sign in (-1, 1)]
         found[name] = replace(found[name], interval=(ends[0], ends[1]))

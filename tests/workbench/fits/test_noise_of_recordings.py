@@ -1,5 +1,6 @@
 """The noise of a channel over several recordings, which step where they join, and short ones."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -11,6 +12,7 @@ from rigwatch.physics.engine.fit import Fit
 from rigwatch.physics.engine.fit.decimation import Thinning
 from rigwatch.physics.engine.fit.recording import Recording, joined
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.workbench.data.columns import Columns
 from rigwatch.workbench.data.noise.noise_floor import (
     NoiseFloor,
     find_period,
@@ -20,8 +22,10 @@ from rigwatch.workbench.data.noise.noise_floor import (
 )
 from rigwatch.workbench.data.noise.quietest_band import quietest_band
 from rigwatch.workbench.data.noise.rounding import rounding
+from rigwatch.workbench.data.recorded_columns import with_derived
 from rigwatch.workbench.data.repeats import repeat_of
 from rigwatch.workbench.study import Study
+from rigwatch.workbench.study.study_file import Derive, Derived
 
 NOISE, RATE = 1e-3, 200.0
 
@@ -42,6 +46,32 @@ def test_it_is_that_of_each_recording() -> None:
 def test_a_short_recording_does_not_hide_the_others() -> None:
     runs = [run_at(0.0, 4000, 1), run_at(1.0, 20, 2)]
     assert quiet_scale(joined(runs)) == pytest.approx([NOISE], rel=0.15)
+
+
+@pytest.mark.parametrize(("samples", "within"), [(1200, 0.3), (12000, 0.15)])
+@pytest.mark.parametrize("order", [0, 1, 2])
+@pytest.mark.parametrize("low_pass", [10.0, 60.0])
+def test_a_derived_output_has_the_noise_that_its_low_pass_leaves(
+    low_pass: float, order: int, samples: int, within: float
+) -> None:
+    """In the filter's stop band there is none, and a derivative has little at low frequencies."""
+    known = {name: Derived(channel="x", order=order) for name in ("moved", "noise")}
+    derive = Derive(low_pass=low_pass, signals=known)
+    run = run_at(0.3, samples, 3)
+    motion, position = 0.2 * np.sin(2 * np.pi * 1.5 / RATE * np.arange(samples)), run.outputs[:, 0]
+    made = with_derived(Columns(1 / RATE, {"x": position}), derive)
+    noise = with_derived(Columns(1 / RATE, {"x": position - motion}), derive).values["noise"]
+    derived = (made.derived["moved"],)
+    found = quiet_scale(replace(run, outputs=made.values["moved"][:, None], derived=derived))
+    assert found == pytest.approx([noise[100:-100].std()], rel=within)
+    left = cast("Fit", SimpleNamespace(residuals=noise[None, :, None]))
+    floor = from_residual(left, replace(run, derived=derived), 0.0, samples)
+    assert floor.rms == pytest.approx(found, rel=within)
+
+
+def test_joined_recordings_keep_what_is_passed_in_each() -> None:
+    runs = [run_at(0.0, 1200, 1), replace(run_at(0.0, 1200, 2), passed=0.2)]
+    assert joined(runs).passed == 0.2
 
 
 @pytest.mark.parametrize("samples", [120, 240, 600, 5120])

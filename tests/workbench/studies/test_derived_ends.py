@@ -1,5 +1,8 @@
-"""Ends of a recording do not count where derived signals drive the model."""
+"""Ends of a recording do not count where derived signals drive the model; nor does noise that the
+low-pass has taken from a derived output.
+"""
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -8,10 +11,12 @@ import pytest
 
 from rigwatch.physics.engine.fit import Thinning
 from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.compare.compare import compare
 from rigwatch.workbench.data import Columns
 from rigwatch.workbench.data.derived_ends import without_ends
 from rigwatch.workbench.data.recorded_columns import with_derived
 from rigwatch.workbench.study.study_file import Derive, Derived, Thin
+from tests.workbench.machine import studied
 
 DT = 0.005
 MEASURED = np.ones((2000, 1))
@@ -53,3 +58,34 @@ def test_a_recording_too_short_to_be_thinned_is_refused(samples: int) -> None:
     with pytest.raises(ModelError, match="expected at least 28 to thin"):
         Thinning(2, 0, (samples,)).apply(np.ones((1, samples, 1)))
     assert Thinning(2, 0, (28,)).apply(np.ones((1, 28, 1))).shape == (1, 14, 1)
+
+
+PUSHED = """
+name = "pushed"
+summary = "A mass that is pushed."
+inputs.force = { unit = "N" }
+parameters.m = { unit = "kg", low = 1e-3 }
+outputs.acceleration = { unit = "m/s^2", expression = "force/m" }
+"""
+UNITS = {"force": "N", "position": "m"}
+ACCELERATION = (
+    'derive = { low_pass = 20.0, signals.acceleration = { channel = "position", order = 2 } }'
+)
+
+
+def pushed(seed: int, mass: float = 0.5) -> dict[str, np.ndarray]:
+    """A position that begins and ends at rest, in closed form, and the force that causes it."""
+    since, turn, width = DT * (np.arange(4000) - 2000), 2 * np.pi * 0.8, 2.0
+    wave, slope = np.sin(turn * since + seed), turn * np.cos(turn * since + seed)
+    grown = np.exp(-(since**2) / (2 * width**2))
+    rate, bend = -since / width**2 * grown, (since**2 / width**4 - 1 / width**2) * grown
+    noise = 1e-6 * np.random.default_rng(seed).normal(size=len(since))
+    force = mass * (bend * wave + 2 * rate * slope - grown * turn**2 * wave)
+    return {"force": force, "position": grown * wave + noise}
+
+
+def test_a_right_model_of_a_derived_output_is_at_its_noise(tmp_path: Path) -> None:
+    rates = (1 / DT, 1 / DT)
+    found = compare(studied(tmp_path, PUSHED, [pushed(1)], [pushed(2)], UNITS, ACCELERATION, rates))
+    assert found.parameters["m"].value == pytest.approx(0.5, rel=2e-3)
+    assert found.noise_floor == pytest.approx(found.held_out_error, rel=0.25)

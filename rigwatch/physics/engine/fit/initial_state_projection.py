@@ -39,6 +39,13 @@ class Tangent:
             found[np.ix_(windows, columns)] = inverse @ along
         return found
 
+    @property
+    def rank(self) -> int:
+        """Number of states, over all windows, that the samples determine."""
+        sizes = (np.linalg.svd(inverse, compute_uv=False) for *_, inverse in self._groups)
+        # Inverted, the smallest singular value that counted is the largest.
+        return sum(int(np.sum(size > 0.1 * NEGLIGIBLE * size[:, :1])) for size in sizes)
+
     def without(self, values: FloatArray) -> FloatArray:
         """Values (windows, k, r) minus their projection on the states."""
         left = values.copy()

@@ -24,7 +24,7 @@ from rigwatch.physics.engine.equations import (
 from rigwatch.physics.engine.fit.decimation import Thinning
 from rigwatch.physics.engine.fit.recording import Recording, ends_of_holes, filled
 from rigwatch.physics.engine.fit.smoothing import best_width, flat_to, smoothed
-from rigwatch.physics.transfer import SensorPhase, sensor_phase
+from rigwatch.physics.transfer import Derivative, SensorPhase, sensor_phase
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
 
@@ -75,7 +75,7 @@ def motion_recording(
     drives = len(model.inputs)
     return Recording(
         recording.dt, inputs, shown, thinning, lengths, drives, recording.passed,
-        spacings=recording.spacings and spacings,
+        spacings=recording.spacings and spacings, derived=_derived(model, recording),
     )  # fmt: skip
 
 
@@ -176,6 +176,12 @@ def _measured_outputs(
         for own in balanced_states(model)
     ]
     return np.stack(rates, axis=1)
+
+
+def _derived(model: Model, recording: Recording) -> tuple[Derivative | None, ...]:
+    """How the outputs of `_measured_outputs` were derived; nothing is told of rates."""
+    names = list(model.outputs)
+    return tuple(recording.derivatives[names.index(name)] for name in predicted_outputs(model))
 
 
 def _thinning(

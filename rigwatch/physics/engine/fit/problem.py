@@ -491,12 +491,29 @@ class Problem:
             self._best = _Best(size, parameters.copy(), self.initial)
         return found
 
-    def cleaned(self, error: FloatArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def tangent(self, slopes: FloatArray) -> Tangent:
+        """The influence of the initial states of all windows; `slopes` as in `Started`."""
+        return self._tangent(slopes, np.arange(len(slopes)))
+
+    def cleaned(
+        self, error: FloatArray, slopes: FloatArray, tangent: Tangent | None = None
+    ) -> tuple[FloatArray, FloatArray]:
         """Residual and Jacobian with the influence of the initial states projected out."""
-        m = len(self.free)
-        tangent = self._tangent(slopes, np.arange(len(slopes)))
+        m, tangent = len(self.free), tangent or self.tangent(slopes)
         both = tangent.without(np.concatenate([error[..., None], slopes[..., :m]], axis=-1))
         return -both[..., 0].ravel(), both[..., 1:].reshape(error.size, m)
+
+    @cached_property
+    def measured_count(self) -> float:
+        """Residuals that samples determine: what is missing, or pads a recording, tells nothing.
+
+        A decimated residual mixes samples; as many of them count as of the samples that they mix.
+        """
+        known, outputs = float(np.sum(np.isfinite(self.measured))), self.measured.shape[2]
+        if self.recording.thinning is None:
+            return known
+        kept = sum(self._lengths) * outputs if self._cut.parts else self.count
+        return float(known / (sum(self.lengths) * outputs) * kept)
 
 
 def _later(error: FloatArray) -> IntArray:

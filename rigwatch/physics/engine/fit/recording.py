@@ -8,6 +8,7 @@ import scipy
 
 from rigwatch.physics.engine.equations import System
 from rigwatch.physics.engine.fit.decimation import Thinning
+from rigwatch.physics.transfer import Derivative
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
 
@@ -34,6 +35,8 @@ class Recording:
         breaks: samples before which inputs are unknown for a while, so that hidden states begin
             anew in the next window.
         spacings: time between the samples of each part if they differ [s]; all `dt` if empty.
+        derived: how each output was derived from a measured channel, None of those that were not;
+            none was if empty.
     """
 
     dt: float
@@ -45,9 +48,15 @@ class Recording:
     passed: float = 0.5
     breaks: tuple[int, ...] = ()
     spacings: tuple[float, ...] = ()
+    derived: tuple[Derivative | None, ...] = ()
 
     def __len__(self) -> int:
         return len(self.inputs)
+
+    @property
+    def derivatives(self) -> tuple[Derivative | None, ...]:
+        """How each output was derived, None of those that were measured, shape (outputs,)."""
+        return self.derived or (None,) * self.outputs.shape[1]
 
     @property
     def excitation(self) -> FloatArray:
@@ -139,6 +148,7 @@ def joined(recordings: Sequence[Recording]) -> Recording:
         inputs=inputs,
         outputs=outputs,
         parts=lengths,
+        passed=min(each.passed for each in recordings),
         breaks=breaks,
         spacings=spacings,
     )
@@ -207,7 +217,10 @@ def initial_states(system: System, recording: Recording, smoothed: int = 11) -> 
     for index, state in enumerate(system.states.values()):
         found[:, index] = state.start
         if state.measured in channels:
-            found[:, index] = filled(channels[state.measured])
+            for part in recording.slices:
+                measured = channels[state.measured][part]
+                if np.isfinite(measured).any():
+                    found[part, index] = filled(measured)
         elif state.rate_of in channels:
             for part, dt in zip(recording.slices, recording.own_spacings, strict=True):
                 found[part, index] = _rate(channels[state.rate_of][part], smoothed, dt)

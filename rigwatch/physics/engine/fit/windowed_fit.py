@@ -64,6 +64,8 @@ class Fit:
         scale: divisor of each output's residuals, shape (outputs,).
         error: scaled residuals, initial states projected out, shape (windows, k).
         jacobian: ∂error/∂(free parameters), shape (windows, k, m).
+        freedom: measured residuals, less the initial states that they determine and the free
+            parameters; at least 1.
         begun_anew: of a fit whose hidden states continue from window to window, the one before in
             which they begin anew in each, as measured ones do; None for others.
     """
@@ -76,6 +78,7 @@ class Fit:
     scale: FloatArray
     error: FloatArray
     jacobian: FloatArray
+    freedom: float = 1.0
     begun_anew: "Fit | None" = None
 
     @property
@@ -306,7 +309,8 @@ def covariance_of(jacobian: FloatArray, variance: float) -> FloatArray:
 def result_of(problem: Problem, found: Started) -> Fit:
     """The fit at the parameters found."""
     error, scale = found.error, problem.scale
-    residual, jacobian = problem.cleaned(error, found.slopes)
+    tangent = problem.tangent(found.slopes)
+    residual, jacobian = problem.cleaned(error, found.slopes, tangent)
     curvature = jacobian.T @ jacobian
     if not np.isfinite(curvature).all():
         raise ModelError(
@@ -315,8 +319,8 @@ def result_of(problem: Problem, found: Started) -> Fit:
         )
     outputs, m = problem.measured.shape[2], len(problem.free)
     counted = problem.whole_recording(error.reshape(len(error), -1, outputs))
-    used = counted.size - found.initial.size - m
-    covariance = covariance_of(jacobian, float(residual @ residual) / max(used, 1))
+    freedom = max(problem.measured_count - tangent.rank - m, 1.0)
+    covariance = covariance_of(jacobian, float(residual @ residual) / freedom)
     left = counted * scale
     if problem.recording.thinning is None:
         left = np.where(np.isnan(problem.whole_recording(problem.measured)), np.nan, left)
@@ -332,4 +336,5 @@ def result_of(problem: Problem, found: Started) -> Fit:
         scale,
         cleaned[..., 0],
         cleaned[..., 1:],
+        freedom,
     )

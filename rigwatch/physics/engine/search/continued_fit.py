@@ -394,11 +394,12 @@ class _ContinuedWindows:
         flat = both.reshape(path.residual.size, 1 + m)
         flat = flat - basis @ (basis.T @ flat)
         residual, jacobian = flat[:, 0], flat[:, 1:]
-        states = len(path.initial) * len(self._shown) + self._first.size
-        variance = float(residual @ residual) / max(len(residual) - states - m, 1)
+        states = self._tangent(path.slopes).rank + self._first.size
+        freedom = max(problem.measured_count - states - m, 1.0)
         return replace(
             plain,
-            covariance=covariance_of(jacobian, variance),
+            covariance=covariance_of(jacobian, float(residual @ residual) / freedom),
+            freedom=freedom,
             error=residual.reshape(path.residual.shape),
             jacobian=jacobian.reshape(*path.residual.shape, m),
             begun_anew=self._found.begun_anew or self._found,

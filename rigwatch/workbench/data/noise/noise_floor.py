@@ -150,7 +150,11 @@ def from_residual(
             return NoiseFloor(np.maximum(found, rounding(recording)), "periods")
     rate = 1 / (recording.dt * factor)
     top = 0.38 if factor > 1 else recording.passed
-    quiet, chances = zip(*(quietest_band([c], rate, top) for c in series.T), strict=True)
+    bands = [
+        quietest_band([channel], rate, top, derived)
+        for channel, derived in zip(series.T, recording.derivatives, strict=True)
+    ]
+    quiet, chances = zip(*bands, strict=True)
     own = unrepeated(fitted, recording) if at_once else None
     if own is not None and np.all(own[0] < quiet):
         return NoiseFloor(own[0], "repeats", own[1])
@@ -289,9 +293,12 @@ def quiet_scale(recording: Recording) -> FloatArray:
     quiet = np.array(
         [
             quietest_band(
-                [channel[part] for part in recording.slices], 1 / recording.dt, recording.passed
+                [channel[part] for part in recording.slices],
+                1 / recording.dt,
+                recording.passed,
+                derived,
             )[0]
-            for channel in recording.outputs.T
+            for channel, derived in zip(recording.outputs.T, recording.derivatives, strict=True)
         ]
     )
     least: FloatArray = 1e-6 * np.where(sizes > 0, sizes, 1.0)
