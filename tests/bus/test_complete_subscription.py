@@ -2,6 +2,7 @@
 
 import signal
 import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -249,12 +250,21 @@ def test_a_ring_that_is_slow_to_say_where_it_is_delays_no_reader(monkeypatch: py
     monkeypatch.setattr(reader, "query", slow)
     for token in hidden:
         network.tell(token, True)
-    say(monitor, range(5, 7))
     looked = threading.Event()
-    threading.Thread(target=lambda: (listener.drain(), looked.set()), daemon=True).start()
-    assert looked.wait(PATIENCE / 2), "the reader waits for the ring"
+    # A second, as names of tokens are learnt in another thread.
+    threading.Thread(target=lambda: (_look_for(listener, 1.0), looked.set()), daemon=True).start()
+    assert looked.wait(PATIENCE / 4), "the reader waits for the ring"
+    say(monitor, range(5, 7))
     answers.set()
     assert heard(listener, 6) == [5, 6]
+
+
+def _look_for(listener: Subscription, seconds: float) -> None:
+    """Look for messages again and again, of which none come."""
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        assert listener.drain() == []
+        time.sleep(0.01)
 
 
 def test_messages_of_a_restarted_process_arrive_from_the_first_on_and_the_break_is_reported():
