@@ -1,11 +1,23 @@
 """An effect that wins alone beside sets of others that leave far less; and what was refused."""
 
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
 import pytest
 
+from rigwatch.workbench.compare import open_bench
+from rigwatch.workbench.explain.explain import ranking
+from rigwatch.workbench.explain.sets.as_simple import by_set_as_simple
 from rigwatch.workbench.explain.sets.combination import Combination
 from rigwatch.workbench.explain.sets.several_effects import _doubted
 from rigwatch.workbench.explain.verdict import judge
 from rigwatch.workbench.ranking import Ranked
+from tests.workbench.dampers import stroke
+from tests.workbench.machine import studied
+from tests.workbench.simulated import knowing
+from tests.workbench.studies.test_recordings_apart import DAMPER, UNITS
 from tests.workbench.verdicts.test_judge import PERIODS, base, row
 
 
@@ -37,6 +49,54 @@ def test_a_set_without_it_that_leaves_far_less_puts_it_in_doubt(
     if word == "undetermined":
         assert set(found.rivals) >= set(pair)
         assert "one@load, other@drive together explain more than alone@load" in found.text
+
+
+def bent(pair_error: float, own_error: float, plain: str = "dry") -> tuple[list[Ranked], Any]:
+    """A law with a shape wins alone; a plain one with another and it with another are sets."""
+    alone = [row("bent@load", 2.0, free=2, family="dry"), row("plain@load", 2.3, family=plain)]
+    pair = Combination((alone[1], row("other@load", pair_error)))
+    own = Combination((alone[0], row("other@load", own_error)))
+    return alone, [*(Combination((each,)) for each in alone), pair, own]
+
+
+@pytest.mark.parametrize(
+    ("pair_error", "own_error", "family", "word", "named"),
+    [
+        (1.8, 1.7, "dry", "missing_effect", "plain@load"),
+        (1.8, 1.7, "wet", "undetermined", "bent@load"),
+        (1.97, 1.9, "dry", "missing_effect", "bent@load"),
+        (1.8, 1.1, "dry", "missing_effect", "bent@load"),
+    ],
+)
+def test_of_one_physics_the_plain_law_is_named_if_a_set_with_it_is_as_simple_and_leaves_less(
+    pair_error: float, own_error: float, family: str, word: str, named: str
+) -> None:
+    alone, every = bent(pair_error, own_error, family)
+    bench: Any = SimpleNamespace(base=base(10.0), floor=PERIODS)
+    verdict = judge(bench.base, alone, PERIODS)
+    assert (verdict.word, verdict.members[0]) == ("missing_effect", "bent@load")
+    found = by_set_as_simple(bench, alone, verdict, every) or verdict
+    assert (found.word, found.members[0]) == (word, named)
+    told = "other@load, plain@load together, with no more parameters, leave 1.8 N" in found.text
+    assert told == (found is not verdict)
+
+
+def test_dry_friction_and_drag_are_not_called_falling_friction_where_more_is_missing(
+    tmp_path: Path,
+) -> None:
+    def force(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+        unknown = 0.1 * np.sin(x / 2.3e-3) * np.cos(v / 0.021)
+        return np.asarray(np.tanh(v / 1e-3) + 110 * v * abs(v) + unknown)
+
+    train, held_out = ([stroke(seed, force, 0.02)] for seed in (0, 1))
+    study = studied(tmp_path / "made", DAMPER, train, held_out, UNITS)
+    few = knowing(study, "coulomb", "stribeck", "quadratic_drag", "linear_stiffness", "gain")
+    found, verdict = ranking(open_bench(few))
+    falling = next(each for each in found if each.label == "stribeck@load")
+    plain = next(each for each in found if each.label == "coulomb@load")
+    assert falling.held_out_error < plain.held_out_error / 1.5
+    assert (verdict.word, verdict.members) == ("missing_effect", ("coulomb@load",))
+    assert "coulomb@load, quadratic_drag@load together, with no more parameters" in verdict.text
 
 
 def test_an_unknown_effect_tells_what_came_nearest_and_why_it_was_refused() -> None:

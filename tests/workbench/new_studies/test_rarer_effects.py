@@ -1,6 +1,7 @@
 """A new study says how many effects are tried, and an unknown one how the others are."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -153,7 +154,12 @@ def test_an_effect_that_only_the_training_reaches_is_undetermined(
     ("law", "rival", "told"),
     [
         pytest.param(soft_stop_below, "stop_below@load", "as little alone", id="of a set"),
-        pytest.param(weak_gap, "jenkins_behind_gap@load", "far less of the training", id="of one"),
+        pytest.param(
+            weak_gap,
+            "jenkins_behind_gap@load",
+            r"[\d.]+ N of the training, jenkins@load [\d.]+$",
+            id="of one",
+        ),
     ],
 )
 def test_a_rarer_effect_like_those_named_is_a_rival_if_it_leaves_less_or_is_simpler(
@@ -168,4 +174,4 @@ def test_a_rarer_effect_like_those_named_is_a_rival_if_it_leaves_less_or_is_simp
     found = json.loads(capsys.readouterr().out)
     assert found["verdict"] == "undetermined"
     assert found["rivals"] == [rival]
-    assert f"{rival} leaves {told}" in found["text"]
+    assert re.search(f"{rival} leaves {told}", found["text"])

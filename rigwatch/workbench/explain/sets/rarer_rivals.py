@@ -4,6 +4,7 @@ They are not ranked with the others, as more candidates make larger classes. Tho
 named are tried here: what leaves only noise need not be what is missing.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from rigwatch.workbench.compare import Bench
@@ -21,7 +22,7 @@ from rigwatch.workbench.ranking import (
     refinements,
     refit,
 )
-from rigwatch.workbench.study import Study
+from rigwatch.workbench.study import Study, told
 
 
 def with_rarer_rivals(
@@ -56,10 +57,20 @@ def with_rarer_rivals(
         return rows, verdict
     rivals = tuple(row.label for row in better)
     lowers = f"{' and '.join((*verdict.beside, best.label))} may be missing, or what is rarer"
-    less = "leaves as little alone" if verdict.beside else "leaves far less of the training"
-    text = f"{lowers} and like that: {', '.join(rivals)} {less}"
+    leaves = "leaves" if len(rivals) == 1 else "each leave"
+    less = "as little alone" if verdict.beside else _of_training(best, better)
+    text = f"{lowers} and like that: {', '.join(rivals)} {leaves} {less}"
     told_now = replace(verdict, word="undetermined", rivals=(*verdict.rivals, *rivals), text=text)
     return in_order([*rows, *better]), told_now
+
+
+def _of_training(best: Ranked, better: Sequence[Ranked]) -> str:
+    """What the rivals leave of the training at most, and what the best does."""
+    assert best.fitted is not None
+    most = max(row.fitted.train_error for row in better if row.fitted is not None)
+    unit = best.fitted.told_in
+    own, most = (told(error, unit) for error in (best.fitted.train_error, most))
+    return f"{most:.3g} {unit} of the training, {best.label} {own:.3g}"
 
 
 def tries_rarer(study: Study) -> bool:

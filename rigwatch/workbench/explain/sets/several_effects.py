@@ -7,7 +7,8 @@ against all candidates while the rest of the set is in the model. An effect is n
 it comes first there and if every equally good set contains it. If no set reduces the residual to
 noise, something else is missing as well, and the verdict on single effects stands. If that names
 none, its text says what the best set leaves, and what every equally good set has in common. If it
-names one, and a set without it leaves far less than any with it, the verdict is undetermined.
+names one, and a set without it leaves far less than any with it, the verdict is undetermined; a set
+with no more parameters need only leave less (`as_simple`).
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -16,6 +17,7 @@ from dataclasses import dataclass, replace
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.explain.remaining_error import shows_little_of_it
+from rigwatch.workbench.explain.sets.as_simple import by_set_as_simple
 from rigwatch.workbench.explain.sets.combination import (
     Combination,
     floor_of,
@@ -87,7 +89,7 @@ def several_effects(
         return verdict
     best = simplest_of_best(every)
     if not any(len(each.rows) > 1 and reaches_noise(bench, each.fitted) for each in every):
-        return _with_best_set(verdict, best, every)
+        return _with_best_set(bench, rows, verdict, best, every)
     parts: list[_Member] = []
     for _ in range(ROUNDS):
         if len(best.rows) == 1:
@@ -153,10 +155,16 @@ def _leaves_little(bench: Bench, best: Ranked) -> bool:
     return little or reaches_noise(bench, best.fitted)
 
 
-def _with_best_set(verdict: Verdict, best: Combination, every: Sequence[Combination]) -> Verdict:
-    """The verdict with what the best set leaves in its text; that of a named effect unchanged."""
+def _with_best_set(
+    bench: Bench,
+    rows: Sequence[Ranked],
+    verdict: Verdict,
+    best: Combination,
+    every: Sequence[Combination],
+) -> Verdict:
+    """The verdict with what the best set leaves in its text, or in doubt of the named effect."""
     if verdict.word == "missing_effect":
-        return _doubted(verdict, every)
+        return by_set_as_simple(bench, rows, verdict, every) or _doubted(verdict, every)
     if verdict.word not in UNNAMED or len(best.rows) == 1:
         return verdict
     text = f"{verdict.text}; {_joined(best.labels)} together leave"
