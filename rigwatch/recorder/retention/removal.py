@@ -11,6 +11,7 @@ other one of its session; one of a session without others is never too old.
 import contextlib
 import math
 import os
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,12 +30,22 @@ EVERY = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A segment on the disk: path, end as Unix time [s], size [bytes], whether it has alarms."""
+    """A segment on the disk: folder, name, end as Unix time [s], size [bytes], whether it has
+    alarms.
 
-    path: str
+    Years have thousands: the texts of folders and names are shared.
+    """
+
+    folder: str
+    name: str
     ended: float
     size: int
     alarms: bool
+
+    @property
+    def path(self) -> Path:
+        """Its file."""
+        return Path(self.folder, self.name)
 
 
 class Retention:
@@ -47,8 +58,7 @@ class Retention:
 
     def __init__(self, settings: RecorderSection, rig: str) -> None:
         self._settings, self._rig = settings, rig
-        # By text: a path of its own takes a kilobyte, and a year has thousands of segments.
-        self._alarms: dict[str, bool] = {}
+        self._alarms: dict[str, dict[str, bool]] = {}
         self._due = 0.0
         self._left = math.inf
 
@@ -63,7 +73,7 @@ class Retention:
         if now < self._due:
             return []
         self._due = now + EVERY
-        removed = [one for one in self.expired(t_ns / 1e9, current) if _remove(Path(one.path))]
+        removed = [one for one in self.expired(t_ns / 1e9, current) if _remove(one.path)]
         if not removed:
             return []
         size = sum(one.size for one in removed) / 1e6
@@ -75,7 +85,6 @@ class Retention:
         newest = _newest(current)
         kept = _size(newest) if newest else 0
         found = list(self._segments(newest, now_s))
-        self._alarms = {one.path: one.alarms for one in found}  # others remove segments too
         size = kept + _size_in(current, found)
         room = int(max(0.0, size - self._left))
         gone = expired(found, self._settings, now_s, kept + room)
@@ -83,20 +92,25 @@ class Retention:
         return gone
 
     def _segments(self, newest: Path | None, now_s: float) -> Iterator[Segment]:
-        for folder in sessions_of(Path(self._settings.folder), self._rig):
+        before, self._alarms = self._alarms, {}  # others remove segments too
+        for path in sessions_of(Path(self._settings.folder), self._rig):
+            folder = str(path)
             found = list(_segments_in(folder))
-            dated = (one.st_mtime for _, one in found if one.st_mtime_ns >= EARLIEST_NS)
-            otherwise = max(dated, default=now_s)
-            for path, one in found:
-                if newest is None or path != str(newest):
-                    ended = one.st_mtime if one.st_mtime_ns >= EARLIEST_NS else otherwise
-                    yield Segment(path, ended, one.st_size, self._has_alarms(path))
+            dated = (ended_ns for _, ended_ns, _ in found if ended_ns >= EARLIEST_NS)
+            otherwise = max(dated, default=now_s * 1e9)
+            known = before.get(folder, {})
+            for name, ended_ns, size in found:
+                if newest is not None and newest.name == name and newest.parent == path:
+                    continue
+                alarms = known[name] if name in known else _has_alarms(path / name)
+                self._alarms.setdefault(folder, {})[name] = alarms
+                ended = (ended_ns if ended_ns >= EARLIEST_NS else otherwise) / 1e9
+                yield Segment(folder, name, ended, size, alarms)
 
-    def _has_alarms(self, path: str) -> bool:
-        if path not in self._alarms:
-            counts = topic_counts(Path(path))
-            self._alarms[path] = counts is None or counts.get(ALARMS.name, 0) > 0
-        return self._alarms[path]
+
+def _has_alarms(path: Path) -> bool:
+    counts = topic_counts(path)
+    return counts is None or counts.get(ALARMS.name, 0) > 0
 
 
 def _remove(path: Path) -> bool:
@@ -112,13 +126,14 @@ def _remove(path: Path) -> bool:
     return True
 
 
-def _segments_in(folder: Path) -> Iterator[tuple[str, os.stat_result]]:
-    """A session's segments; not those that are removed meanwhile."""
+def _segments_in(folder: str) -> Iterator[tuple[str, int, int]]:
+    """Name, time [ns] and size of a session's segments; not of those that are removed meanwhile."""
     with contextlib.suppress(OSError), os.scandir(folder) as found:
         for entry in found:
             if entry.name.endswith(SUFFIX):
                 with contextlib.suppress(OSError):
-                    yield entry.path, entry.stat()
+                    seen = entry.stat()
+                    yield sys.intern(entry.name), seen.st_mtime_ns, seen.st_size
 
 
 def _newest(current: Path) -> Path | None:
@@ -127,8 +142,7 @@ def _newest(current: Path) -> Path | None:
 
 
 def _size_in(folder: Path, segments: list[Segment]) -> int:
-    own = f"{folder}{os.sep}"
-    return sum(one.size for one in segments if one.path.startswith(own))
+    return sum(one.size for one in segments if one.folder == str(folder))
 
 
 def _size(path: Path) -> int:
