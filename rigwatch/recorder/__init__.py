@@ -7,11 +7,12 @@ has come, for a recorder that is restarted; `retention` removes and thins old re
 that archives have too. `past` closes the gap that a cut link to a remote rig leaves.
 """
 
-from rigwatch.recorder.folders import last_block, newest, sessions_of
+from rigwatch.recorder.folders import last_block, newest
 from rigwatch.recorder.positions import FILES as POSITIONS
 from rigwatch.recorder.positions import load_positions
 from rigwatch.recorder.process import run
 from rigwatch.recorder.retention import expired
+from rigwatch.recorder.session_list import sessions_of
 from rigwatch.recorder.several import run_several
 
 __all__ = [

@@ -13,7 +13,6 @@ tell: a session recorded while the clock was years ahead would be the newest for
 
 import contextlib
 import math
-import re
 import time
 from collections import deque
 from collections.abc import Iterator
@@ -22,6 +21,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from rigwatch.recorder.positions import Positions, load_positions
+from rigwatch.recorder.session_list import sessions_of
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.host import replace_file
 from rigwatch.wire.messages import SAMPLES, Block, RunInfo, Topic
@@ -31,7 +31,6 @@ LONGEST_BREAK = 120.0
 """Interruption after which a recorder starts a new session [s]."""
 _SECOND_NS = 1_000_000_000
 _FORMAT = "%Y%m%dT%H%M%SZ"
-_STAMP = re.compile(r"\d{8}T\d{6}Z(-\d+)?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,13 +47,6 @@ class Place:
     last: tuple[int, int] | None = None
     positions: Positions = field(default_factory=dict)
     changed: bool = False
-
-
-def sessions_of(root: Path, rig: str) -> Iterator[Path]:
-    """Folders of the rig's sessions, without those of a rig whose id begins with this one's."""
-    for path in root.glob(f"{rig}-*Z*"):
-        if _STAMP.fullmatch(path.name.removeprefix(f"{rig}-")):
-            yield path
 
 
 def note_last(folder: Path, rig: str) -> None:

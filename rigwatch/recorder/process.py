@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rigwatch.recorder.disk import DiskWatch
-from rigwatch.recorder.disks import Disks, take_turns
+from rigwatch.recorder.disk_turns import DiskTurns, take_turns
 from rigwatch.recorder.feed import CATCH_UP, Feed
 from rigwatch.recorder.folders import (
     LONGEST_BREAK,
@@ -225,7 +225,7 @@ class _Turn:
         self._error: Exception | None = None
 
     def begin(self) -> None:
-        """See `disks.Turn`."""
+        """See `disk_turns.Turn`."""
         self._try(self._begin)
 
     def _begin(self) -> None:
@@ -233,12 +233,12 @@ class _Turn:
         self._recorder.begin_turn(time.monotonic(), time.time_ns())
 
     def sync(self) -> None:
-        """See `disks.Turn`."""
+        """See `disk_turns.Turn`."""
         if self._error is None:
             self._try(self._recorder.sync)
 
     def end(self) -> None:
-        """See `disks.Turn`."""
+        """See `disk_turns.Turn`."""
         if self._error is not None:
             raise self._error
         self._recorder.end_turn()
@@ -259,7 +259,7 @@ def record(
     stop: threading.Event,
     pulse: Pulse,
     *,
-    disks: Disks | None = None,
+    disks: DiskTurns | None = None,
 ) -> Path:
     """Record until `stop` is set, telling `pulse` of each turn; returns the session's folder.
 

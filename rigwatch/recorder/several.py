@@ -1,4 +1,4 @@
-"""Several rigs in one recorder process; those of one disk take turns (`disks`).
+"""Several rigs in one recorder process; those of one disk take turns (`disk_turns`).
 
 Each rig begins and ends in a thread of its own: a session that takes long to go on with delays no
 other, and a disk that hangs delays those of no other disk.
@@ -8,7 +8,7 @@ import threading
 from functools import partial
 from pathlib import Path
 
-from rigwatch.recorder.disks import Disks
+from rigwatch.recorder.disk_turns import DiskTurns
 from rigwatch.recorder.process import PROCESS, describe_run, process_name, record
 from rigwatch.wire.bus import SharedLinks, joined
 from rigwatch.wire.host import (
@@ -29,7 +29,7 @@ MANY = 32
 
 
 def work_of(
-    path: Path, notes: str, folders: dict[Path, Path], links: SharedLinks, disks: Disks
+    path: Path, notes: str, folders: dict[Path, Path], links: SharedLinks, disks: DiskTurns
 ) -> Work:
     """The recording of one rig; it writes its session's folder into `folders` at its end."""
 
@@ -63,7 +63,7 @@ def run_several(paths: list[Path], stop: threading.Event, notes: str = "") -> li
     folders: dict[Path, Path] = {}
     valid_rigs(paths)  # a wrong file is named by its rig's thread
     keep_memory_tidy(stop)
-    links, disks = SharedLinks(len(paths)), Disks()
+    links, disks = SharedLinks(len(paths)), DiskTurns()
     parts = [
         Part(str(path), work_of(path, notes, folders, links, disks), partial(used, path))
         for path in paths

@@ -6,18 +6,13 @@ that they have changed: hundreds of rigs are looked at twice a second.
 """
 
 import hashlib
-import time
 from contextlib import suppress
 from pathlib import Path
 
 from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.file_marks import Mark, is_certain, mark_of
 from rigwatch.wire.rig_config import rig_text
 from rigwatch.wire.typed_files import files_of
-
-CERTAIN_AFTER_NS = 2_000_000_000
-"""Age of a change after which a further one has another time on any file system [ns]."""
-Mark = tuple[int, int, int, int, int]
-"""Disk, number, size, and times of change of a file [ns]."""
 
 
 class SettledFile:
@@ -56,22 +51,18 @@ class SettledFile:
     def _is_unchanged(self) -> bool:
         """Whether the files are certainly as they were when they were read."""
         with suppress(OSError):
-            return bool(self._marks) and self._marks == {file: _mark(file) for file in self._marks}
+            return bool(self._marks) and self._marks == {
+                file: mark_of(file) for file in self._marks
+            }
         return False
 
     def _certain_marks(self) -> dict[Path, Mark]:
         """Those of the files that are read next; none while they may change without a trace."""
         try:
-            marks = {file: _mark(file) for file in files_of(self._path)}
+            marks = {file: mark_of(file) for file in files_of(self._path)}
         except ConfigError:
             return {}
-        changed_ns = max(max(mark[-2:]) for mark in marks.values())
-        return marks if time.time_ns() - changed_ns > CERTAIN_AFTER_NS else {}
-
-
-def _mark(file: Path) -> Mark:
-    found = file.stat()
-    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
+        return marks if all(map(is_certain, marks.values())) else {}
 
 
 def _content(path: Path) -> bytes:

@@ -19,6 +19,7 @@ from rigwatch.supervisor import RigSet, Supervisor, settled_file
 from rigwatch.supervisor.child import LONGEST_LINE
 from rigwatch.supervisor.rig_set import GONE_AFTER
 from rigwatch.supervisor.settled_file import SettledFile
+from rigwatch.wire import file_marks
 from rigwatch.wire.rig_config import load_rig, rig_text
 from rigwatch.wire.typed_files.shipped import find_config
 from tests.monitor_process.test_several import rig_file
@@ -111,7 +112,7 @@ def test_files_that_have_not_changed_are_not_read_again(
     file = SettledFile(path)
     looks = [file.has_new_content() for _ in range(5)]
     assert (looks, reads["rig.toml"]) == ([False] * 5, 6), "it has changed just now"
-    monkeypatch.setattr(settled_file, "CERTAIN_AFTER_NS", 0)
+    monkeypatch.setattr(file_marks, "CERTAIN_AFTER_NS", 0)
     file.has_new_content()
     reads.clear()
     assert not any(file.has_new_content() for _ in range(5))

@@ -6,9 +6,9 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from rigwatch.recorder.folders import sessions_of
 from rigwatch.recorder.past.pages import PAGE_BYTES, Bookmark, Page, Question
 from rigwatch.recorder.past.shares import Shares
+from rigwatch.recorder.session_list import sessions_of
 from rigwatch.wire.bus import Bus
 from rigwatch.wire.messages import PAST_KEY, topic
 from rigwatch.wire.session import SUFFIX, Place, Wanted, read_page

@@ -16,10 +16,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from rigwatch.recorder.folders import sessions_of
 from rigwatch.recorder.positions import FILES
 from rigwatch.recorder.retention.age_clock import EARLIEST_NS
 from rigwatch.recorder.retention.rules import expired
+from rigwatch.recorder.session_list import sessions_of
 from rigwatch.wire.messages import ALARMS, Event
 from rigwatch.wire.rig_config import RecorderSection
 from rigwatch.wire.session import SUFFIX, topic_counts

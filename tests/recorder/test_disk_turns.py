@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rigwatch.recorder.disks import Disks
+from rigwatch.recorder.disk_turns import DiskTurns
 from tests.waiting import PATIENCE, eventually
 
 EVERY = 0.005
@@ -15,7 +15,7 @@ OTHER_DISK = Path("/dev/shm")
 class Recording:
     """The turns of one recording, in a thread of its own as in a process of several rigs."""
 
-    def __init__(self, disks: Disks, folder: Path) -> None:
+    def __init__(self, disks: DiskTurns, folder: Path) -> None:
         self.turns, self.threads, self.error = 0, set[int](), ""
         self.fails_in, self.disk_answers = "", threading.Event()
         self.syncing = threading.Event()
@@ -24,7 +24,7 @@ class Recording:
         self.thread = threading.Thread(target=self._run, args=[disks, folder], daemon=True)
         self.thread.start()
 
-    def _run(self, disks: Disks, folder: Path) -> None:
+    def _run(self, disks: DiskTurns, folder: Path) -> None:
         try:
             disks.serve(self, folder, EVERY, self.stop)
         except OSError as error:
@@ -59,7 +59,7 @@ def go_on(*recordings: Recording) -> None:
 def test_recordings_of_one_disk_take_turns_in_one_thread_and_each_ends_alone(
     tmp_path: Path,
 ) -> None:
-    disks = Disks()
+    disks = DiskTurns()
     one, other, third = (Recording(disks, tmp_path / "not made yet") for _ in range(3))
     go_on(one, other, third)
     assert len(one.threads | other.threads | third.threads) == 1
@@ -73,7 +73,7 @@ def test_recordings_of_one_disk_take_turns_in_one_thread_and_each_ends_alone(
 
 
 def test_files_of_one_disk_are_synced_at_the_same_time(tmp_path: Path) -> None:
-    disks = Disks()
+    disks = DiskTurns()
     recordings = [Recording(disks, tmp_path) for _ in range(4)]
     go_on(*recordings)
     for one in recordings:
@@ -89,7 +89,7 @@ def test_files_of_one_disk_are_synced_at_the_same_time(tmp_path: Path) -> None:
 def test_a_disk_that_hangs_delays_no_recording_on_another(tmp_path: Path) -> None:
     if OTHER_DISK.stat().st_dev == tmp_path.stat().st_dev:
         pytest.skip("there is only one disk")
-    disks = Disks()
+    disks = DiskTurns()
     here, there = Recording(disks, tmp_path), Recording(disks, OTHER_DISK)
     go_on(here, there)
     there.disk_answers.clear()

@@ -43,7 +43,7 @@ def take_turns(turn: Turn, every: float, stop: threading.Event) -> None:
         turn.end()
 
 
-class Disks:
+class DiskTurns:
     """The turns of a process's recordings, apart for each disk."""
 
     def __init__(self) -> None:
