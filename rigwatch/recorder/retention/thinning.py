@@ -2,8 +2,8 @@
 
     recorder ──start──▶ rigwatch archive thin FOLDER … ──one line of JSON──▶ event
 
-The process takes only processor time that nobody else wants, and there are pauses between two of
-them: together they take less than a quarter of a core, however much has to be thinned.
+The process takes only processor time that nobody else wants, of the rigs of a recorder one is thinned
+at a time, and there are pauses between two sessions of a rig.
 """
 
 import json
@@ -11,6 +11,7 @@ import os
 import random
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
@@ -30,6 +31,8 @@ PAUSE, RESTS = 60.0, 3.0
 FIRST = 60.0
 """Time from the start of the recorder to the first look [s]."""
 STOP_TIMEOUT = 1.0
+_one_at_a_time = threading.Lock()
+"""Held while a process thins: hundreds of rigs would start as many at once."""
 
 
 class Thinning:
@@ -58,17 +61,19 @@ class Thinning:
             return []
         self._due = now + FIRST if self._due is None else self._due
         if self._process is None:
-            if now < self._due:
+            if now < self._due or not _one_at_a_time.acquire(blocking=False):
                 return []
             try:
                 self._start(now, t_ns)
             except OSError as error:
+                _one_at_a_time.release()
                 self._due = now + EVERY
                 return self._failed(str(error), t_ns)
         assert self._process is not None
         if (code := self._process.poll()) is None:
             return []
         self._process = None
+        _one_at_a_time.release()
         return self._ended(code, now, t_ns)
 
     def close(self) -> None:
@@ -76,6 +81,7 @@ class Thinning:
         if self._process is not None:
             end_process(self._process, STOP_TIMEOUT)
             self._process = None
+            _one_at_a_time.release()
 
     def _start(self, now: float, t_ns: int) -> None:
         self._began = now

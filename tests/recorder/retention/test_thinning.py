@@ -78,6 +78,37 @@ def test_a_trouble_that_lasts_is_told_once(tmp_path: Path, monkeypatch: pytest.M
     assert not old.exists()
 
 
+def test_the_rigs_of_a_recorder_are_thinned_one_after_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(thinning, "FIRST", 0.0)
+    folders = [tmp_path / "one", tmp_path / "two"]
+    for folder in folders:
+        session_of(folder, 0)
+        session_of(folder, 1)
+    settings = [RecorderSection(folder=str(folder), thin_days=1.0) for folder in folders]
+    first, second = (Thinning(one, "bench1") for one in settings)
+    first.update(0.0, time.time_ns())
+    second.update(0.0, time.time_ns())
+    assert first._process is not None
+    assert second._process is None, "the first is not done yet"
+    told = list[Event]()
+
+    def thinned() -> bool:
+        for one in (first, second):
+            told.extend(one.update(1.0, time.time_ns()))
+        return len(told) == 2
+
+    eventually(thinned, "both are thinned")
+    assert [one.code for one in told] == ["RECORDING_THINNED"] * 2
+    second._due = first._due = 0.0
+    first.update(1.0, time.time_ns())
+    first.close()
+    second.update(1.0, time.time_ns())
+    assert second._process is not None, "one that has ended is in nobody's way"
+    second.close()
+
+
 @pytest.mark.parametrize(
     "wrong",
     [
