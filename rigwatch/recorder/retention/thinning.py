@@ -2,8 +2,8 @@
 
     recorder ──start──▶ rigwatch archive thin FOLDER … ──one line of JSON──▶ event
 
-The process takes only processor time that nobody else wants, of the rigs of a recorder one is thinned
-at a time, and there are pauses between two sessions of a rig.
+The process takes only processor time that nobody else wants. One rig of a recorder is thinned at a
+time, and there are pauses between two sessions of a rig.
 """
 
 import json
