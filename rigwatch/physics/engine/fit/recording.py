@@ -2,18 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
 
 from rigwatch.physics.engine.equations import System
 from rigwatch.physics.engine.fit.decimation import Thinning
+from rigwatch.physics.transfer import Derivative
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
-
-if TYPE_CHECKING:
-    from rigwatch.physics.transfer import Derivative  # with SciPy's filters, which are slow to load
 
 SAME_SPACING = 1e-6
 """Relative difference of times between samples up to which they are the same."""
@@ -51,13 +48,13 @@ class Recording:
     passed: float = 0.5
     breaks: tuple[int, ...] = ()
     spacings: tuple[float, ...] = ()
-    derived: tuple["Derivative | None", ...] = ()
+    derived: tuple[Derivative | None, ...] = ()
 
     def __len__(self) -> int:
         return len(self.inputs)
 
     @property
-    def derivatives(self) -> tuple["Derivative | None", ...]:
+    def derivatives(self) -> tuple[Derivative | None, ...]:
         """How each output was derived, None of those that were measured, shape (outputs,)."""
         return self.derived or (None,) * self.outputs.shape[1]
 
