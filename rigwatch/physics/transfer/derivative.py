@@ -7,7 +7,7 @@ looked for where its own low-pass has taken it away.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
+import scipy
 
 from rigwatch.wire.arrays import FloatArray
 
@@ -37,7 +37,8 @@ class Derivative:
         Args:
             signal: 16 samples or more, as the low-pass continues it at both ends; all finite.
         """
-        found = sosfiltfilt(butter(FILTER_ORDER, self.low_pass, fs=self.rate, output="sos"), signal)
+        filters = scipy.signal.butter(FILTER_ORDER, self.low_pass, fs=self.rate, output="sos")
+        found = scipy.signal.sosfiltfilt(filters, signal)
         for _ in range(self.order):
             found = np.gradient(found, 1 / self.rate)
         return np.asarray(found)
