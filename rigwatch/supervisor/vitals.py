@@ -20,7 +20,8 @@ class Limits:
         silence: between two notifications of a process.
         stall: without samples while its source has them.
         patience: longest delay of a start for the processes that come before it.
-        stop: from the request to stop to the kill.
+        stop: from the request to stop, or the last report that it stops, to the kill.
+        longest_stop: from the request to the kill, whatever is reported.
         first_pause: before the first restart; doubled for each further one.
         longest_pause: before any restart.
         settled: after running this long, a process counts as healthy again.
@@ -31,6 +32,7 @@ class Limits:
     stall: float = 10.0
     patience: float = 60.0
     stop: float = 8.0
+    longest_stop: float = 45.0
     first_pause: float = 0.2
     longest_pause: float = 30.0
     settled: float = 10.0
@@ -45,7 +47,7 @@ class Vitals:
         heard_at: time of its last notification.
         ready: whether it has reported ready.
         ready_at: when it first did so; until then it may be compiling kernels.
-        stopping: whether it has reported that it is stopping.
+        stopping_at: when it last reported that it is stopping.
         count: samples that passed through it since its start.
         advanced_at: when the count last increased.
         flowing_since: since when it has increased without a pause.
@@ -60,7 +62,7 @@ class Vitals:
     heard_at: float = field(init=False)
     ready: bool = False
     ready_at: float = field(init=False)
-    stopping: bool = False
+    stopping_at: float = -math.inf
     count: int = 0
     advanced_at: float = field(init=False)
     flowing_since: float = field(init=False)
@@ -79,7 +81,7 @@ class Vitals:
             if name == "READY":
                 self._is_ready(now)
             elif name == "STOPPING":
-                self.stopping = True
+                self.stopping_at = now
             elif name == "STATUS":
                 self.status = value
             elif name == "X_RIGWATCH_COUNT" and value.isdigit():

@@ -1,6 +1,7 @@
 """Rigs in threads of one process: one that hangs or fails delays none and is reported."""
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -96,6 +97,27 @@ def test_the_process_ends_beside_a_rig_that_never_ends(running, monkeypatch):
     running.stop.set()
     eventually(lambda: not running.thread.is_alive(), "the end of the loop")
     held.set()
+
+
+def test_rigs_that_end_one_after_the_other_are_all_waited_for(running, monkeypatch):
+    monkeypatch.setattr(side_by_side, "STOP_PATIENCE", 1.0)
+    ends, ended = threading.Lock(), list[str]()
+
+    def ends_slowly(name: str) -> Callable[[threading.Event, RigPulse], None]:
+        def work(stop: threading.Event, pulse: RigPulse) -> None:
+            counting(stop, pulse)
+            with ends:  # as recordings do that close their files
+                time.sleep(0.4)
+                ended.append(name)
+
+        return work
+
+    parts = running.start(**{name: ends_slowly(name) for name in "abcdef"})
+    for part in parts:
+        running.go_on(part)
+    running.stop.set()
+    running.thread.join()
+    assert sorted(ended) == [*"abcdef"]
 
 
 def test_only_a_rig_whose_configuration_has_changed_starts_anew(running):

@@ -185,6 +185,16 @@ def test_stopping_goes_backwards_and_nothing_is_left_behind() -> None:
     assert not any(Path(f"/proc/{pid}").exists() for pid in pids)
 
 
+def test_a_process_that_goes_on_to_stop_is_not_killed() -> None:
+    slow = WORKER.replace(
+        "beat.stopping()",
+        "for _ in range(6):\n    beat.still_stopping(1.0)\n    time.sleep(0.5)",
+    )
+    plans = [worker("recorder", slow.format(step=1))]
+    events = supervise(plans, lambda supervisor, _: all_ready(supervisor))
+    assert [event.text for event in of_kind(events, "recorder", "stopped")] == ["stopped"]
+
+
 def test_a_process_cannot_be_judged_by_words_that_waited_for_a_late_supervisor() -> None:
     vitals = Vitals(0.0)
     vitals.take("READY=1\nX_RIGWATCH_COUNT=5", now=30.0)

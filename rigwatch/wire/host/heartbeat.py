@@ -8,6 +8,7 @@ process uses one protocol for either parent, and none if it was started by hand.
     X_RIGWATCH_COUNT=n      its loop runs; n samples passed since it started
     STATUS=text             one line for people
     STOPPING=1              it is stopping
+    EXTEND_TIMEOUT_USEC=5   it goes on to do so, and is not to be killed for this time [µs]
 
 A loop that runs without samples is alive but feeds the watchdog only if it says what it waits for:
 to start it again would bring no unplugged device back.
@@ -104,6 +105,10 @@ class Heartbeat:
     def stopping(self) -> None:
         """Report that the process is stopping."""
         self._say("STOPPING=1")
+
+    def still_stopping(self, within: float) -> None:
+        """Report that it is still stopping, and ends or reports again within so many seconds."""
+        self._say(f"STOPPING=1\nEXTEND_TIMEOUT_USEC={within * 1e6:.0f}")
 
     def _say(self, text: str) -> bool:
         """Whether the supervisor has it: a lost or slow one never stops what it monitors."""

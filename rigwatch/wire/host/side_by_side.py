@@ -26,7 +26,9 @@ FIRST_PAUSE, LONGEST_PAUSE = 1.0, 30.0
 START_PATIENCE = 10.0
 """Longest wait for all rigs before the process counts as ready [s]."""
 STOP_PATIENCE = 5.0
-"""Longest wait for the rigs' loops to end [s]."""
+"""Longest wait for a further one of the rigs' loops to end [s]."""
+LONGEST_STOP = 40.0
+"""Longest wait for all of them: hundreds of recordings end one after the other [s]."""
 _NOTHING = object()
 _log = logging.getLogger(__name__)
 
@@ -135,9 +137,10 @@ class Part:
         self._ended = True
         self._stop.set()
 
-    def wait(self, timeout: float) -> None:
-        """Wait for its end, up to `timeout` [s]."""
-        self._thread.join(max(0.0, timeout))
+    def has_ended(self, timeout: float) -> bool:
+        """Whether it has ended, after up to `timeout` [s]."""
+        self._thread.join(timeout)
+        return not self._thread.is_alive()
 
     def _run(self) -> None:
         while not self._ended:
@@ -183,6 +186,17 @@ def run_side_by_side(
     heartbeat.stopping()
     for part in parts:
         part.stop()
-    deadline = time.monotonic() + STOP_PATIENCE
-    for part in parts:
-        part.wait(deadline - time.monotonic())
+    _wait_for_ends(parts, heartbeat)
+
+
+def _wait_for_ends(parts: Sequence[Part], heartbeat: Heartbeat) -> None:
+    """Wait for the rigs' loops to end, as long as one of them does now and then."""
+    began = ended_at = time.monotonic()
+    running = list(parts)
+    while running and time.monotonic() < min(ended_at + STOP_PATIENCE, began + LONGEST_STOP):
+        running[0].has_ended(BEAT)
+        left = [part for part in running if not part.has_ended(0.0)]
+        if len(left) < len(running):
+            ended_at = time.monotonic()
+            heartbeat.still_stopping(STOP_PATIENCE)
+        running = left
