@@ -192,7 +192,7 @@ class JointRows:
         facts = self.state.forms.facts[row]
         free = np.flatnonzero(facts[:, 0] == 0)
         # One of the others that is needed again is learnt again.
-        place = int(free[0]) if free.size else int(form.fixed.size % MOST_FORMS)
+        place = int(free[0]) if free.size else form.samples % MOST_FORMS
         store_form(self.state.forms, row, place, form)
 
     def taken(self) -> list[Batch]:

@@ -20,8 +20,8 @@ LONGEST_BLOCK, MOST_COLUMNS = 2048, 16
 """Size of a block [bytes] and number of its columns up to which it is read here."""
 MOST_SAMPLES = LONGEST_BLOCK // 16
 """A sample has two times at least."""
-MOST_FORMS = 4
-"""Forms of a rig that are kept: a live block has few lengths."""
+MOST_FORMS = 8
+"""Forms of a rig that are kept: blocks have one or two lengths, and some more on a busy machine."""
 _LENGTH, _SAMPLES, _SEQ, _SEQ_END, _DEVICE_US, _T_NS, _COLUMNS = range(7)
 
 

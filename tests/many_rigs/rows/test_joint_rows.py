@@ -1,6 +1,6 @@
 """Blocks of many rigs out of a joined message, and into one: the same as each by itself."""
 
-from collections import deque
+from collections import Counter, deque
 from dataclasses import replace
 from functools import partial
 
@@ -12,7 +12,7 @@ from rigwatch.wire.bus.several.joint_message import Part, join, split
 from rigwatch.wire.bus.several.joint_receiver import JointReceiver, Share
 from rigwatch.wire.bus.several.joint_sender import LARGEST
 from rigwatch.wire.errors import MessageError
-from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock, encode
+from rigwatch.wire.messages import Column, EstimateBlock, Form, SampleBlock, encode
 from rigwatch.wire.messages.message_types import ColumnTable
 from rigwatch.wire.ordering import Numbered
 from rigwatch.wire.rows import Batch, Blocks, EstimateRows, JointRows
@@ -80,6 +80,23 @@ def test_what_follows_is_taken_as_it_was_sent_whatever_the_lengths() -> None:
         for place, one in enumerate(blocks):
             assert encode(block_in(batch, place)) == encode(one) == batch.payload(place)
             following[order[place]] += len(one)
+
+
+def test_the_lengths_of_a_busy_machine_are_learnt_once_or_twice() -> None:
+    rng, rows, learnt = np.random.default_rng(7), JointRows(1), list[int]()
+    assert rows.name(0, RIGS[0])
+    names = tuple((name, unit, True) for name, unit in NAMES)
+
+    def suits(form: Form) -> bool:
+        learnt.append(form.samples)
+        return form.names == names
+
+    following = 20_000  # from here on the number takes as many bytes
+    assert rows.open(RIGS[0], Source("daq", "rig", boot_of(0), suits), following)
+    for n in rng.integers(6, 14, 400).tolist():
+        assert rows.take(join([part_of(samples(0, following, n, rng))]), "daq") == []
+        following += n
+    assert max(Counter(learnt).values()) <= 2, "a row keeps eight lengths"
 
 
 def flagged(block: SampleBlock) -> SampleBlock:
