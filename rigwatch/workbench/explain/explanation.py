@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from rigwatch.physics.engine.search import at_bound
 from rigwatch.workbench.compare import Bench, Comparison, added_variances, comparison, unweighed
 from rigwatch.workbench.experiment import Experiment, propose
 from rigwatch.workbench.explain.adequacy import ends_of_range, uncalibrated
@@ -85,6 +86,7 @@ class Explanation:
             that more is missing; 0 if it, or the set that it was judged in, explains the error.
         exchange: an effect that describes the last accepted one better, if nothing beside it
             explains the error; None if none does, or if that was not asked.
+        on_bound: names of the named effect's own parameters that are on a bound.
     """
 
     verdict: str
@@ -103,6 +105,7 @@ class Explanation:
     unlike: str = ""
     remains: float = 0.0
     altered: list[str] = field(default_factory=list)
+    on_bound: list[str] = field(default_factory=list)
 
 
 def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanation:
@@ -135,6 +138,7 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         unlike=unlike,
         remains=_remains(bench, verdict),
         altered=list(bench.data.altered),
+        on_bound=_on_bound(verdict),
     )
 
 
@@ -182,6 +186,15 @@ def _remains(bench: Bench, verdict: Verdict) -> float:
     if best is None or best.fitted is None or verdict.beside or verdict.second:
         return 0.0
     return remaining_share(bench.base, best, bench.floor)
+
+
+def _on_bound(verdict: Verdict) -> list[str]:
+    """Names of the named effect's own parameters that are on a bound."""
+    best = verdict.best if verdict.word in STRENGTH_TOLD else None
+    if best is None or best.fitted is None:
+        return []
+    touching = dict.fromkeys(at_bound(best.fitted.train))
+    return list(best.placement.own(touching))
 
 
 def _reliability(bench: Bench, verdict: Verdict) -> tuple[float | None, tuple[int, int]]:
