@@ -21,7 +21,7 @@ from rigwatch.workbench.explain.verdict_calibration import (
     probability_wrong_logged,
 )
 from rigwatch.workbench.fit import Value, as_written, values
-from rigwatch.workbench.ranking import Ranked, vanishing_shape
+from rigwatch.workbench.ranking import Ranked, neutral_strength, vanishing_shape
 from rigwatch.workbench.study import FILE, Study, assumed_values
 
 STRENGTH_TOLD = ("missing_effect", "undetermined")
@@ -30,6 +30,10 @@ STRENGTH_TOLD = ("missing_effect", "undetermined")
 UNEXPLAINED = ("unknown_effect", "model_inadequate")
 """Verdicts that values of another machine may cause."""
 ASSUMED = "{names}: taken from the model file; set this machine's under [start] in {file}"
+NOT_NEUTRAL = (
+    "beyond some value it changes next to nothing; {neutral:g} is refuted by the error without it"
+)
+"""Note on the strength of an accepted effect that saturates."""
 
 
 @dataclass(frozen=True)
@@ -233,15 +237,19 @@ def _row(row: Ranked, alike: list[str], more: Mapping[str, float] | None = None)
 
 
 def _with_open_strength(row: Ranked, found: dict[str, Value]) -> dict[str, Value]:
-    """The values, with a note at the strength of an accepted effect if its shape leaves that open.
+    """The values, with a note at the strength of an accepted effect if its interval is open.
 
-    The slip force of a contact that hardly slips is such: its stiffness is determined.
+    The slip force of a contact that hardly slips is such, of which the stiffness is determined, and
+    the strength of a limit that is too hard to tell how hard it is.
     """
+    assert row.fitted is not None
     effect, prefix = row.placement.effect, row.placement.prefix
     name, neutral = prefix + effect.strength, effect.parameters[effect.strength].neutral
     interval = found[name].interval if name in found else None
     if not row.accepted or interval is None or not interval[0] <= neutral <= interval[1]:
         return found
+    if neutral_strength(row.fitted.train, row.placement) is not None:
+        return found | {name: replace(found[name], note=NOT_NEUTRAL.format(neutral=neutral))}
     shape = [other for other in vanishing_shape(effect) if found[prefix + other].interval]
     note = f"determined only together with {', '.join(shape)}" if shape else found[name].note
     return found | {name: replace(found[name], note=note)}
