@@ -30,10 +30,8 @@ STRENGTH_TOLD = ("missing_effect", "undetermined")
 UNEXPLAINED = ("unknown_effect", "model_inadequate")
 """Verdicts that values of another machine may cause."""
 ASSUMED = "{names}: taken from the model file; set this machine's under [start] in {file}"
-NOT_NEUTRAL = (
-    "beyond some value it changes next to nothing; {neutral:g} is refuted by the error without it"
-)
-"""Note on the strength of an accepted effect that saturates."""
+NOT_NEUTRAL = "its interval is open, but {neutral:g} is refuted by the error without it"
+"""Note on the strength of an accepted effect whose interval holds the neutral value."""
 
 
 @dataclass(frozen=True)

@@ -224,11 +224,6 @@ def doubt_of(found: Explanation) -> str:
     cases, wrong = found.like_this
     if found.unlike:
         return f"the probability of being wrong is unknown: {found.unlike}, unlike simulated cases"
-    if found.wrong_probability is None and not cases:
-        return (
-            "the probability of being wrong is not calibrated for this verdict of a model along the"
-            " measured motion"
-        )
     if not cases:
         return "the probability of being wrong is unknown: no simulated case is similar to this one"
     kind = (

@@ -154,7 +154,7 @@ def test_a_strength_that_saturates_is_not_taken_for_a_neutral_one(tmp_path: Path
     strength = best.parameters["r"]
     assert strength.interval is not None
     assert strength.interval[0] < 0
-    assert strength.note.endswith("; 0 is refuted by the error without it")
+    assert strength.note.endswith("but 0 is refuted by the error without it")
     assert best.parameters["vr"].value == pytest.approx(0.03, rel=0.1)
 
 
