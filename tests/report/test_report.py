@@ -213,7 +213,10 @@ def test_a_doubt_is_stated_no_finer_than_simulated_cases_support(
     study: Study, most: float | None, cases: tuple[int, int], unlike: str, said: str
 ) -> None:
     found = gather(study).explanation
-    told = replace(found, wrong_at_most=most, like_this=cases, unlike=unlike)
+    stated = None if most is None else found.wrong_probability
+    told = replace(
+        found, wrong_at_most=most, wrong_probability=stated, like_this=cases, unlike=unlike
+    )
     assert said in doubt_of(told)
 
 

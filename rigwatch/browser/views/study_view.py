@@ -10,7 +10,7 @@ from rigwatch.browser.views.pages import render
 from rigwatch.browser.views.study_state import State
 from rigwatch.workbench.data import predicts_along_motion
 from rigwatch.workbench.explain import Explanation, Row
-from rigwatch.workbench.report import VERDICTS, doubt_of
+from rigwatch.workbench.report import VERDICTS, at_its_bounds, doubt_of
 
 PARTS = ("verdict", "ledger", "missing", "where", "parameters", "data")
 VIEWS = {
@@ -89,7 +89,7 @@ def headline(state: State) -> str:
         return "Compared, not explained yet" if state.comparison else "Not fitted yet"
     text = VERDICTS[found.verdict]
     if found.verdict in ("missing_effect", "undetermined"):
-        text = _in_words(found)
+        text = _in_words(found) + at_its_bounds(found)
     return text[0].upper() + text[1:]
 
 

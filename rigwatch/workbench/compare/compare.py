@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rigwatch.physics.engine.search import Convergence
+from rigwatch.workbench.compare.given_values import far_from_given
 from rigwatch.workbench.compare.preparation import Bench, open_bench
 from rigwatch.workbench.compare.uncertainty_budget import added_variances
 from rigwatch.workbench.data import METHODS
@@ -94,6 +95,7 @@ def comparison(bench: Bench) -> Comparison:
     alone = len(channels) == 1
     total = floor.rms[0] if alone else np.sqrt(np.mean((floor.rms / base.train.scale) ** 2))
     found = values(base.train, added_variances(bench.study, bench.data, bench.bare, base))
+    written = as_written(found, base.compiled.system)
     weak = [f"{n}: {value.note}" for n, value in found.items() if value.note and value.interval]
     return Comparison(
         base.train_error,
@@ -102,9 +104,9 @@ def comparison(bench: Bench) -> Comparison:
         base.error_unit,
         METHODS[floor.method],
         channels,
-        as_written(found, base.compiled.system),
+        written,
         [f"{a.effect}@{a.port}" for a in bench.study.file.effects],
-        [*bench.data.remarks, *weak, *_unchanging(bench)],
+        [*bench.data.remarks, *weak, *far_from_given(bench, written), *_unchanging(bench)],
         dict(bench.study.holds),
         base.convergence or (bench.study.kept.convergence if bench.study.kept else None),
         base.told_in,

@@ -85,8 +85,9 @@ def favoured_by_training(
     else, which may favour a wrong effect there. Where it leaves half of the training, these are
     accepted effects; one with more parameters must explain clearly more, as each further parameter
     explains some. Where it leaves a third of both errors they need not be accepted, as the rest may
-    raise the error of the right effect, but must be as simple and explain clearly more, and what is
-    held out must not speak for the best far beyond chance: many effects are compared.
+    raise the error of the right effect, but must be as simple, or lead on what is held out too and
+    be passed over for their parameters, and explain clearly more; and what is held out must not
+    speak for the best far beyond chance: many effects are compared.
     """
     assert best.fitted is not None
     after = best.fitted
@@ -105,10 +106,16 @@ def favoured_by_training(
         more, simple = _explained(base, fitted), row.free <= best.free
         if row.accepted and train > HALF and more > (1.0 if simple else FAVOURED) * gain:
             return True
-        much = simple and min(held_out, train) >= LITTLE and more > FAVOURED * gain
+        clear = (simple or leads_held_out(best, row)) and more > FAVOURED * gain
+        much = clear and min(held_out, train) >= LITTLE
         return much and difference(after.held_out, fitted.held_out).p_rises >= REFUTED
 
     return tuple(row.label for row in rows if _is_another(best, row) and favoured(row))
+
+
+def leads_held_out(best: Ranked, row: Ranked) -> bool:
+    """Whether an accepted effect leaves less of what is held out than the one named for it."""
+    return row.accepted and row.fitted is not None and error_ratio(best, row) < 1.0
 
 
 def not_refuted(

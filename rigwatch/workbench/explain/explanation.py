@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from rigwatch.physics.engine.search import at_bound
 from rigwatch.workbench.compare import Bench, Comparison, added_variances, comparison, unweighed
 from rigwatch.workbench.experiment import Experiment, propose
 from rigwatch.workbench.explain.adequacy import ends_of_range, uncalibrated
@@ -20,7 +21,7 @@ from rigwatch.workbench.explain.verdict_calibration import (
     probability_wrong_logged,
 )
 from rigwatch.workbench.fit import Value, as_written, values
-from rigwatch.workbench.ranking import Ranked, vanishing_shape
+from rigwatch.workbench.ranking import Ranked, neutral_strength, vanishing_shape
 from rigwatch.workbench.study import FILE, Study, assumed_values
 
 STRENGTH_TOLD = ("missing_effect", "undetermined")
@@ -29,6 +30,8 @@ STRENGTH_TOLD = ("missing_effect", "undetermined")
 UNEXPLAINED = ("unknown_effect", "model_inadequate")
 """Verdicts that values of another machine may cause."""
 ASSUMED = "{names}: taken from the model file; set this machine's under [start] in {file}"
+NOT_NEUTRAL = "its interval is open, but {neutral:g} is refuted by the error without it"
+"""Note on the strength of an accepted effect whose interval holds the neutral value."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,7 @@ class Explanation:
             that more is missing; 0 if it, or the set that it was judged in, explains the error.
         exchange: an effect that describes the last accepted one better, if nothing beside it
             explains the error; None if none does, or if that was not asked.
+        on_bound: names of the named effect's own parameters that are on a bound.
     """
 
     verdict: str
@@ -103,6 +107,7 @@ class Explanation:
     unlike: str = ""
     remains: float = 0.0
     altered: list[str] = field(default_factory=list)
+    on_bound: list[str] = field(default_factory=list)
 
 
 def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanation:
@@ -135,6 +140,7 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         unlike=unlike,
         remains=_remains(bench, verdict),
         altered=list(bench.data.altered),
+        on_bound=_on_bound(verdict),
     )
 
 
@@ -184,6 +190,15 @@ def _remains(bench: Bench, verdict: Verdict) -> float:
     return remaining_share(bench.base, best, bench.floor)
 
 
+def _on_bound(verdict: Verdict) -> list[str]:
+    """Names of the named effect's own parameters that are on a bound."""
+    best = verdict.best if verdict.word in STRENGTH_TOLD else None
+    if best is None or best.fitted is None:
+        return []
+    touching = dict.fromkeys(at_bound(best.fitted.train))
+    return list(best.placement.own(touching))
+
+
 def _reliability(bench: Bench, verdict: Verdict) -> tuple[float | None, tuple[int, int]]:
     """Probability that the verdict is wrong, and how many similar cases were, of how many."""
     later, rough = bool(bench.study.file.effects), bench.study.model.rough
@@ -220,15 +235,19 @@ def _row(row: Ranked, alike: list[str], more: Mapping[str, float] | None = None)
 
 
 def _with_open_strength(row: Ranked, found: dict[str, Value]) -> dict[str, Value]:
-    """The values, with a note at the strength of an accepted effect if its shape leaves that open.
+    """The values, with a note at the strength of an accepted effect if its interval is open.
 
-    The slip force of a contact that hardly slips is such: its stiffness is determined.
+    The slip force of a contact that hardly slips is such, of which the stiffness is determined, and
+    the strength of a limit that is too hard to tell how hard it is.
     """
+    assert row.fitted is not None
     effect, prefix = row.placement.effect, row.placement.prefix
     name, neutral = prefix + effect.strength, effect.parameters[effect.strength].neutral
     interval = found[name].interval if name in found else None
     if not row.accepted or interval is None or not interval[0] <= neutral <= interval[1]:
         return found
+    if neutral_strength(row.fitted.train, row.placement) is not None:
+        return found | {name: replace(found[name], note=NOT_NEUTRAL.format(neutral=neutral))}
     shape = [other for other in vanishing_shape(effect) if found[prefix + other].interval]
     note = f"determined only together with {', '.join(shape)}" if shape else found[name].note
     return found | {name: replace(found[name], note=note)}

@@ -20,6 +20,7 @@ from rigwatch.workbench.explain.contradicting import (
     explaining_all,
     explaining_training,
     favoured_by_training,
+    leads_held_out,
     leaves_less_of_all,
     not_refuted,
 )
@@ -169,6 +170,8 @@ def _doubt(
         return "unknown_effect", (), text
     if others := favoured_by_training(base, best, rows, floor):
         more = f"more of the training error, much of which {best.label} leaves"
+        if ahead is None and any(row.label in others and leads_held_out(best, row) for row in rows):
+            leads += " of those as simple"
         return "undetermined", others, f"{leads}, but {', '.join(others)} explains {more}"
     if untold := not_refuted(base, best, rows, floor):
         why = "resembles the residual more, and its fit ended in a local minimum"

@@ -13,6 +13,8 @@ from rigwatch.workbench.ranking.acceptance import (
     judge_fit,
     left_over,
     neutral_strength,
+    refutes_neutral,
+    vanishes,
     vanishing_shape,
 )
 from rigwatch.workbench.ranking.candidates import candidates, shapes_of, suitable
@@ -88,12 +90,14 @@ __all__ = [
     "refit",
     "refit_from_given",
     "refit_nested",
+    "refutes_neutral",
     "same_family",
     "score_all",
     "scored",
     "select_for_fit",
     "shapes_of",
     "suitable",
+    "vanishes",
     "vanishing_shape",
     "with_refinements",
 ]

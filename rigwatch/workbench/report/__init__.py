@@ -4,6 +4,7 @@ from rigwatch.workbench.report.charts import motion_units, residual_over_motion
 from rigwatch.workbench.report.html_report import write_report
 from rigwatch.workbench.report.text_report import (
     VERDICTS,
+    at_its_bounds,
     base_lines,
     change_lines,
     comparison_lines,
@@ -19,6 +20,7 @@ from rigwatch.workbench.report.text_report import (
 
 __all__ = [
     "VERDICTS",
+    "at_its_bounds",
     "base_lines",
     "change_lines",
     "comparison_lines",

@@ -12,7 +12,7 @@ from rigwatch.workbench.compare import Region
 from rigwatch.workbench.explain import Explanation
 from rigwatch.workbench.fit import Value
 from rigwatch.workbench.report import charts
-from rigwatch.workbench.report.text_report import VERDICTS, doubt_of, more_missing
+from rigwatch.workbench.report.text_report import VERDICTS, at_its_bounds, doubt_of, more_missing
 from rigwatch.workbench.steps import Signals, Stage
 from rigwatch.workbench.study import Study
 
@@ -66,11 +66,12 @@ def headline(m: Material) -> str:
     undecided = f"{name} from {rivals}" if rivals else f"whether {name or 'anything'} is missing"
     words = {
         "nothing_missing": "nothing is missing",
-        "missing_effect": f"probably missing: {name}{more_missing(m.explanation)}",
+        "missing_effect": f"probably missing: {name}{more_missing(m.explanation)}"
+        + at_its_bounds(m.explanation),
         "undetermined": f"this recording cannot tell {undecided}",
     }.get(m.explanation.verdict, VERDICTS[m.explanation.verdict])
     if m.explanation.also:
-        words = m.explanation.text
+        words = m.explanation.text + at_its_bounds(m.explanation)
     if len(m.stages) == 1:
         return words[0].upper() + words[1:]
     fall = f"Error {first.told(first.held_out_error):.3g} → {last.told(last.held_out_error):.3g}"

@@ -142,8 +142,8 @@ def explanation_lines(found: Explanation) -> list[str]:
 
 
 def headline(found: Explanation) -> str:
-    """The verdict in a few words, and how much more than the effect that it names is missing."""
-    return VERDICTS[found.verdict] + more_missing(found)
+    """The verdict in a few words, how much more is missing, and what else to know of its effect."""
+    return VERDICTS[found.verdict] + more_missing(found) + at_its_bounds(found)
 
 
 def more_missing(found: Explanation) -> str:
@@ -154,6 +154,19 @@ def more_missing(found: Explanation) -> str:
         f", and more than that: it leaves {found.remains:.0%} of the error's energy, for which no"
         " known effect is found yet"
     )
+
+
+def at_its_bounds(found: Explanation) -> str:
+    """That the effect which a verdict names is at an end of its own bounds; empty if it is not."""
+    if found.verdict != "missing_effect" or not found.on_bound:
+        return ""
+    own = found.ranking[0].parameters
+    values = [
+        f"{name} ({own[name].value:.3g} {own[name].unit}".removesuffix(" 1") + ")"
+        for name in found.on_bound
+    ]
+    ends = "is on a bound" if len(values) == 1 else "are on bounds"
+    return f"; its {' and '.join(values)} {ends}: the recordings may ask for another shape"
 
 
 def _named_lines(found: Explanation) -> list[str]:
@@ -211,11 +224,6 @@ def doubt_of(found: Explanation) -> str:
     cases, wrong = found.like_this
     if found.unlike:
         return f"the probability of being wrong is unknown: {found.unlike}, unlike simulated cases"
-    if found.wrong_probability is None and not cases:
-        return (
-            "the probability of being wrong is not calibrated for this verdict of a model along the"
-            " measured motion"
-        )
     if not cases:
         return "the probability of being wrong is unknown: no simulated case is similar to this one"
     kind = (

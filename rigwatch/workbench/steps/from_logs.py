@@ -100,7 +100,7 @@ def _file(files: NewFiles, logs: Logs, model: Model, reading: Matched) -> tuple[
             choices.append(f"{use.replace('_', ' ')}: {_in_words(logs, part)}{never}")
     for path in logs.healthy:
         lines += _span("healthy", path.stem, Part(0), logs)
-    return "\n".join(lines) + "\n", [*choices, *_not_fitted(logs, model)]
+    return "\n".join(lines) + "\n", [*choices, *_not_fitted(logs, model), *_not_held(logs, model)]
 
 
 def _derive_section(
@@ -135,6 +135,17 @@ def _not_fitted(logs: Logs, model: Model) -> list[str]:
     return [
         f"{', '.join(fixed)}: not fitted, taken from the model file; set known values with"
         f" --set {fixed[0]}=VALUE"
+    ]
+
+
+def _not_held(logs: Logs, model: Model) -> list[str]:
+    """A remark on values given for parameters that are fitted, if there are any."""
+    fitted = [name for name in logs.start if not model.parameters[name].fixed]
+    if not fitted:
+        return []
+    return [
+        f"{', '.join(fitted)}: fitted, beginning at the value given; to hold it, set `fixed = true`"
+        " in the model's file (`rigwatch model new` copies one that is shipped)"
     ]
 
 

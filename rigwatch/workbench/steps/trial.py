@@ -14,11 +14,12 @@ from typing import Any
 
 from msgspec import structs
 
+from rigwatch.physics.engine.equations import Placement
 from rigwatch.physics.engine.score import suits
 from rigwatch.wire.errors import ModelError, nearest
 from rigwatch.workbench.compare import Bench, Comparison, Warm
 from rigwatch.workbench.explain import SetGain, set_gain
-from rigwatch.workbench.fit import error_text
+from rigwatch.workbench.fit import error_text, fit_model
 from rigwatch.workbench.ranking import (
     Progress,
     Ranked,
@@ -29,7 +30,9 @@ from rigwatch.workbench.ranking import (
     rank_only,
     refit_from_given,
     refit_nested,
+    refutes_neutral,
     shapes_of,
+    vanishes,
 )
 from rigwatch.workbench.steps.kept_holds import with_kept_holds
 from rigwatch.workbench.study import (
@@ -197,13 +200,31 @@ def _no_longer_needed(bench: Bench) -> str:
     own, found = bench.base, []
     for count, placement in enumerate(reversed(own.placements[:-1]), start=2):
         strength = neutral_strength(own.train, placement)
-        if strength is not None:
+        if strength is not None and not _needed(bench, placement):
             found.append(
                 f"; {placement.name}@{placement.port} is no longer needed ({strength}): to take it"
                 f" out, `rigwatch undo {bench.study.folder}` {count} times, then add what came"
                 " after it"
             )
     return "".join(found)
+
+
+def _needed(bench: Bench, placement: Placement) -> bool:
+    """Whether the training refutes the model without an effect of open strength.
+
+    That without it is the same as it at its neutral strength, if nothing of it is left there.
+    """
+    own = bench.base
+    if not vanishes(placement.effect):
+        return False
+    others = [each for each in own.placements if each is not placement]
+    its = {placement.prefix + name for name in placement.effect.parameters}
+    begin = {name: value for name, value in own.train.values().items() if name not in its}
+    try:
+        without = fit_model(bench.study, bench.data, others, begin, own.train.scale)
+    except ModelError:
+        return True
+    return refutes_neutral(without.train, own.train, placement.effect)
 
 
 def _told(error: float, where: Comparison) -> str:

@@ -131,6 +131,33 @@ def test_a_strength_that_may_as_well_be_neutral_is_not_accepted(tmp_path: Path) 
     assert change.tried[1] < 0.5 * change.before.held_out_error
 
 
+RELIEF = effect(
+    "relief",
+    "r/(1 + r)*k*(v - max(min(v, vr), -vr))",
+    r="unit = '1', role = 'strength', low = 0.0, value = 1.0",
+    k="unit = 'N s/m', role = 'constant', value = 300.0",
+    vr="unit = '{v}', role = 'shape', value = 0.02, low = 0.005, high = 0.2",
+)
+"""A valve that opens at a speed; the wider it opens, the less a wider one would change."""
+
+
+def relieved(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """A relief that is as good as complete."""
+    return np.asarray(300 * v - 298.5 * (v - np.clip(v, -0.03, 0.03)))
+
+
+def test_a_strength_that_saturates_is_not_taken_for_a_neutral_one(tmp_path: Path) -> None:
+    study = damper(tmp_path, relieved, RELIEF)
+    found = explain(knowing(study, "relief", "constant_force", "linear_stiffness"))
+    best = found.ranking[0]
+    assert (found.verdict, best.effect, best.accepted) == ("missing_effect", "relief", True)
+    strength = best.parameters["r"]
+    assert strength.interval is not None
+    assert strength.interval[0] < 0
+    assert strength.note.endswith("but 0 is refuted by the error without it")
+    assert best.parameters["vr"].value == pytest.approx(0.03, rel=0.1)
+
+
 SOFT = effect(
     "soft",
     "-A*tanh(x/w)",

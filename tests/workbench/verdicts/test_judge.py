@@ -822,6 +822,28 @@ def test_what_leads_with_more_parameters_is_a_rival_where_rivals_are_told(
     assert ("of those as simple (limit@drive lowers it further)" in found.text) == told
 
 
+@pytest.mark.parametrize(
+    ("held_out", "train", "left", "word"),
+    [
+        pytest.param(1.99, 1.3, 2.0, "undetermined", id="leads on both"),
+        pytest.param(2.01, 1.3, 2.0, "missing_effect", id="leads on the training alone"),
+        pytest.param(1.99, 1.8, 2.0, "missing_effect", id="explains hardly more of the training"),
+        pytest.param(1.99, 1.0, 1.4, "missing_effect", id="little of the training is left"),
+    ],
+)
+def test_what_leads_on_all_recordings_is_not_passed_over_for_its_parameters_where_much_is_left(
+    held_out: float, train: float, left: float, word: str
+) -> None:
+    simple = trained(best("rate@drive", 2.0), left)
+    leader = trained(row("limit@drive", held_out, free=2), train)
+    found = judge(base(3.0), [simple, leader], QUIET)
+    assert found.word == word
+    assert found.best is simple
+    if word == "undetermined":
+        assert found.rivals == ("limit@drive",)
+        assert found.text.startswith("rate@drive lowers the held-out error most of those as simple")
+
+
 def _with_training_error(of: Ranked, error: float) -> None:
     assert of.fitted is not None
     of.fitted = replace(of.fitted, train=base(error).train)

@@ -10,6 +10,7 @@ from rigwatch.physics.engine.search.continued_fit import (
 )
 from rigwatch.physics.engine.search.convergence import (
     Convergence,
+    at_bound,
     at_other_values,
     convergence,
     undetermined,
@@ -24,6 +25,7 @@ __all__ = [
     "Convergence",
     "ShortHorizons",
     "WholeRuns",
+    "at_bound",
     "at_other_values",
     "begun_anew_nearby",
     "continued_spread",
