@@ -10,6 +10,7 @@ from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.measured_motion import (
     along_measured_motion,
     has_hidden_states,
+    is_level_known,
     predicted_outputs,
     sensor_states,
     unjudged_along_motion,
@@ -177,6 +178,31 @@ def test_what_follows_the_acceleration_is_not_moved_by_a_push_at_rest(speed: flo
 
     assert abs(means[0]) > 1.0
     assert means[1] == pytest.approx(0.0 if speed == 0.0 else means[0], abs=1e-9)
+
+
+def test_a_balance_rests_at_a_level_of_its_own_where_its_mean_is_taken_away() -> None:
+    plain = shipped_models()["servo-pneumatic"]
+    fixed = {name: replace(p, fixed=True) for name, p in plain.parameters.items()}
+    open_level = unmoved_at_rest(replace(plain, parameters=fixed), level_known=False)
+    compiled = compile_system(compose(along_measured_motion(open_level)))
+    names = list(compiled.system.states)
+    start = np.array([[state.start for state in compiled.system.states.values()]])
+    start[0, names.index("acceleration_at_rest")] = 3.0
+    run = compiled.simulate(
+        np.tile([0.5, 0.0, 0.0], (1024, 1)), 1 / 256, np.zeros(1, np.int64), 1024,
+        initial=start, parameters=compiled.vector({}),
+    )  # fmt: skip
+
+    assert run.last[0][names.index("mean")] == pytest.approx(3.0, rel=1e-4)
+    assert run.last[0][names.index("acceleration_at_rest")] == 3.0
+    assert not is_level_known(open_level)
+    assert is_level_known(unmoved_at_rest(plain))
+
+
+def test_a_balance_rests_at_zero_where_a_sensor_shows_its_mean() -> None:
+    plain = shipped_models()["mass-spring-damper"]
+    assert unmoved_at_rest(plain, level_known=False) == unmoved_at_rest(plain)
+    assert is_level_known(unmoved_at_rest(plain, level_known=False))
 
 
 def test_positions_alone_are_predicted_as_a_balance() -> None:

@@ -19,6 +19,7 @@ from rigwatch.physics.engine.equations import (
     Model,
     along_measured_motion,
     compose,
+    is_level_known,
     unmoved_at_rest,
 )
 from rigwatch.physics.engine.fit import Recording, beginning
@@ -110,10 +111,9 @@ def _tried(
 
 def _along(study: Study, names: Sequence[str]) -> Model:
     """The model with these variants along the measured motion, with the study's sensors, holds."""
-    model, known = (
-        along_measured_motion(unmoved_at_rest(varied(study, names).model)),
-        study.model.parameters,
-    )
+    known = study.model.parameters
+    held = unmoved_at_rest(varied(study, names).model, level_known=is_level_known(study.model))
+    model = along_measured_motion(held)
     sensors = [n for o in model.outputs.values() for n in (o.late, o.corner) if n in known]
     parameters = model.parameters | {n: known[n] for n in sensors if not known[n].kept}
     return structs.replace(model, inputs=study.model.inputs, parameters=parameters)

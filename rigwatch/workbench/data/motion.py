@@ -73,13 +73,11 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
         ModelError: no channel measures any of the model's states, no output is left to predict, or
             no sample of a recording counts.
     """
-    model = along_measured_motion(unmoved_at_rest(study.model))
     # One width for all recordings: the smoothing is part of the fitted model.
     shown_by = data.healthy or data.train
     widths = motion_widths(study.model, shown_by)
     phases = motion_phases(study.model, data.healthy) if data.healthy is not None else {}
     late = {channel: phase.shift for channel, phase in phases.items() if phase.shift}
-    model = with_sensor_chain(model, phases)
     slow = SLOW * _rms(motion_recording(study.model, shown_by, widths=widths).inputs)
 
     def made(recording: Recording) -> Recording:
@@ -96,6 +94,10 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
         if recording is not None and not np.isfinite(recording.outputs).any(axis=0).all():
             raise ModelError(f"{use}: {NONE_COUNTS}")
     openings = made(data.openings) if data.openings is not None else None
+    # A healthy motion without rests does not tell at what level the model's balance rests.
+    level_known = healthy is None or _rests(study, healthy) or not _rests(study, train, held_out)
+    held = unmoved_at_rest(study.model, level_known=level_known)
+    model = with_sensor_chain(along_measured_motion(held), phases)
     longest = max(len(r) for r in (train, held_out, healthy) if r is not None)
     form = form_along_motion(study.model)
     told: tuple[str, ...] = () if healthy is not None else (UNCHECKED,)
@@ -158,6 +160,13 @@ def _with_rests(study: Study, recording: Recording, slow: FloatArray) -> Recordi
             still &= maximum_filter1d(np.abs(rate), STUCK) < slow[column]
             inputs[maximum_filter1d(still, STUCK), column] = 0.0
     return replace(recording, inputs=inputs)
+
+
+def _rests(study: Study, *recordings: Recording) -> bool:
+    """Whether a motion rests in any of the recordings, of `_with_rests`."""
+    measured = enumerate(measured_states(study.model), start=len(study.model.inputs))
+    rates = [column for column, state in measured if state.order == 1]
+    return any(bool(np.any(recording.inputs[:, rates] == 0.0)) for recording in recordings)
 
 
 def _while_moving(study: Study, recording: Recording, slow: FloatArray) -> Recording:

@@ -27,13 +27,15 @@ from dataclasses import dataclass
 from msgspec.structs import replace
 
 from rigwatch.physics.engine.equations.expression import names_in
-from rigwatch.physics.engine.equations.model import Input, Model, Output
+from rigwatch.physics.engine.equations.model import Input, Model, Output, State
 from rigwatch.physics.engine.equations.quantities import names_reached, spelt_out
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.units import unit_of
 
 RATE_SUFFIX = "_rate"
 """Suffix of the output that is the balance of a state, after the state's name."""
+LEVEL_SUFFIX = "_at_rest"
+"""Suffix of the state at which a balance rests, after the balance's name."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +168,7 @@ def along_measured_motion(model: Model) -> Model:
     )
 
 
-def unmoved_at_rest(model: Model) -> Model:
+def unmoved_at_rest(model: Model, *, level_known: bool = True) -> Model:
     """The model, not transformed, with balances that are zero while their motion is exactly zero.
 
     Whatever holds a body that sticks balances what pushes it, so that its speed does not change.
@@ -174,16 +176,37 @@ def unmoved_at_rest(model: Model) -> Model:
     acceleration that is not there, and hidden states that follow it, as the mean that an AC-coupled
     sensor takes away, are wrong for long after the body moves again.
 
+    What a sensor takes away as a mean is not known of the balance either: parameters that were
+    fitted to a motion without rests may leave a push in it that never moves the body. Where that
+    is so, the balance rests at a level that is one more hidden state.
+
     Args:
         model: only balances that are a quantity of their own are found.
+        level_known: whether zero is where the model's balances rest; if not, those that a sensor
+            keeps the mean of rest at a constant state, the initial value of which is not known.
     """
-    quantities = dict(model.quantities)
+    quantities, states = dict(model.quantities), dict(model.states)
     for state in balanced_states(model):
-        own = quantities.get(model.states[state.name].derivative)
+        name = model.states[state.name].derivative
+        own = quantities.get(name)
         if own is not None and state.order == 1:
             held = f"abs(sign({state.name}))*({own.expression})"
-            quantities[model.states[state.name].derivative] = replace(own, expression=held)
-    return replace(model, quantities=quantities)
+            if not level_known and _is_averaged(model, name):
+                level = f"{name}{LEVEL_SUFFIX}"
+                held += f" + (1 - abs(sign({state.name})))*{level}"
+                states[level] = State(unit=own.unit, derivative="0")
+            quantities[name] = replace(own, expression=held)
+    return replace(model, quantities=quantities, states=states)
+
+
+def is_level_known(model: Model) -> bool:
+    """Whether zero is where the balances of a model of `unmoved_at_rest` rest."""
+    return not any(name.endswith(LEVEL_SUFFIX) for name in model.states)
+
+
+def _is_averaged(model: Model, balance: str) -> bool:
+    """Whether a state of a sensor follows a balance, a quantity."""
+    return any(balance in _named(model.states[name].derivative) for name in sensor_states(model))
 
 
 def _outputs(model: Model) -> dict[str, Output]:
