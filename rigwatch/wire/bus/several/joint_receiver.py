@@ -64,7 +64,8 @@ class JointReceiver:
     def distribute(self) -> None:
         """Hand out what has come, but for what the rows take."""
         with self._lock:
-            self._distribute(self.rows)
+            while (found := self._following()) is not None:
+                self._hand_out(found)
 
     def name(self, row: int, rig: str) -> bool:
         """Give a row to a rig; False if there are none, or it can have none."""
@@ -99,19 +100,18 @@ class JointReceiver:
         if self.rows is not None:
             self.rows.close(rig)
 
-    def _distribute(self, rows: OpenRows | None) -> None:
-        while (found := self._following()) is not None:
-            data, sender, _ = found
-            try:
-                parts = split(data) if rows is None else rows.take(data, sender)
-            except MessageError:
-                self.strange.append(found)
-                continue
-            for rig, mark, payload in parts:
-                self._close(rig)
-                for share in self._rigs.get(rig, ()):
-                    share.comes_joined = True
-                    share.waiting.append((payload, sender, mark))
+    def _hand_out(self, found: Received) -> None:
+        data, sender, _ = found
+        try:
+            parts = split(data) if self.rows is None else self.rows.take(data, sender)
+        except MessageError:
+            self.strange.append(found)
+            return
+        for rig, mark, payload in parts:
+            self._close(rig)
+            for share in self._rigs.get(rig, ()):
+                share.comes_joined = True
+                share.waiting.append((payload, sender, mark))
 
 
 class Share:
