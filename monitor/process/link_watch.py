@@ -162,6 +162,12 @@ def disk_reports(
     yield "recording_stopped", Cause(text=why), gone or stopped
 
 
+OF_OTHERS = frozenset(
+    name for name, *_ in (*device_reports(None, 0.0, ""), *disk_reports(None, ""))
+)
+"""The alarms of what daq and recorder say: samples go on meanwhile."""
+
+
 def occasion(seen: Seen, cause: Cause, t_ns: int) -> Occasion:
     """The occasion at `t_ns` [ns] of an alarm that no sample raises."""
     boot, seq = seen.position

@@ -28,6 +28,7 @@ from monitor.process.handover import Passed, Rested
 from monitor.process.health import HealthBook
 from monitor.process.key_watch import KeyWatch
 from monitor.process.link_watch import (
+    OF_OTHERS,
     LinkWatch,
     Report,
     Seen,
@@ -89,6 +90,8 @@ TURN = 0.02
 """Longest wait for samples before commands and silence are checked [s]."""
 LONGEST_BLOCK = 512
 """Number of samples processed and published per step while the monitor catches up."""
+ABSENT = "not there"
+"""Stands for the reason of an absence that is not told."""
 
 
 class MonitorProcess:
@@ -135,7 +138,7 @@ class MonitorProcess:
         self._delivered_s = self._estimated_s = 0.0
         self._router_lost_at: float | None = None
         self._recorder: Health | None = None
-        self._unsuitable, self._nothing_held = "", False
+        self._unsuitable, self._link_holds, self._others_trouble = "", True, False
         self._standing = self.rig.alarms.standing()
         check = CommandCheck(bus, config.bus.security)
         self._operators = OperatorDesk(bus, check)
@@ -199,8 +202,11 @@ class MonitorProcess:
 
     @property
     def is_quiet(self) -> bool:
-        """Whether the last look around has found nothing that holds, and no ranking is to begin."""
-        return self._nothing_held and not self._unsuitable and not self._explainer.waits_for_samples
+        """Whether the last look around has found no trouble with the samples, and no ranking is to
+        begin; the alarms of recording and device may hold.
+        """
+        calm = not self._link_holds and not self._unsuitable
+        return calm and not self._explainer.waits_for_samples
 
     def open_row(self, suits: Callable[[Form], bool]) -> Rested | None:
         """Leave samples to a row of a table, if they simply follow and nothing else happens.
@@ -245,35 +251,40 @@ class MonitorProcess:
         return self._cursor
 
     def is_calm(self, silent_s: float) -> bool:
-        """Whether a look around would find what the last one found: nothing that holds.
+        """Whether a look around would find what the last one found, and nothing to tell.
 
         Args:
             silent_s: time since the last sample [s].
         """
         return (
-            self._nothing_held
+            not self._link_holds
             and silent_s <= self._stale_after
             and not self._health.will_be_due(time.monotonic_ns())
             and self._hears_nothing_new()
             and not self._operators.has_some
             and not self._models.has_some
             and not self._explainer.has_results
-            and (self._recorder is None or self._recorder_presence.has_token)
             and not self.reader.has_some_alone
         )
 
     def _hears_nothing_new(self) -> bool:
         """Whether daq and recorder say nothing, or nothing that has to be told."""
+        there = self._recorder is None or self._recorder_presence.has_token
         if not len(self._of_daq) and not len(self._of_recorder):
-            return True
-        self._hear_of_others()
+            if there and not self._others_trouble:
+                return True
+        else:
+            self._hear_of_others()
         if self._daq_trouble or self._two_devices:
             return False
-        return not any(holds for *_, holds in self._reports_of_others())
+        return not any(
+            self.rig.alarms.holds(name) != holds
+            for name, _, holds in self._reports_of_others(why=False)
+        )
 
     def look_around(self) -> None:
         """Execute commands, check the link, publish the health."""
-        self._nothing_held = False
+        self._link_holds = True
         now_ns = self._now_ns()
         for announced in self._operators.execute(self.rig.alarms, now_ns, self._last_judged()):
             self.say(announced)
@@ -282,12 +293,11 @@ class MonitorProcess:
             self.bus.publish(EVENTS, event)
         seen = self._seen()
         self.say(self.rig.alarms.pass_to(now_ns))
-        calm = True
-        for name, cause, holds in self._reports(seen):
+        reports = [*self._reports(seen)]
+        for name, cause, holds in reports:
             if self.rig.alarms.holds(name) != holds:
                 at = occasion(seen, cause, now_ns)
                 self.say(self.rig.alarms.report(name, at, active=holds))
-            calm = calm and not holds
         if reason := self._links.lasting_reason(seen):
             self.say(self.rig.alarms.reword("link", reason, now_ns))
         self._shelf = shelf_of(self.rig.alarms)
@@ -295,7 +305,9 @@ class MonitorProcess:
         self._announce_clock_step(seen)
         if self._health.is_due(seen.monotonic_ns):
             self._tell_health(seen)
-        self._nothing_held = calm and self._router_lost_at is None
+        held = {name for name, _, holds in reports if holds}
+        self._others_trouble = not held.isdisjoint(OF_OTHERS)
+        self._link_holds = bool(held - OF_OTHERS) or self._router_lost_at is not None
 
     def _now_ns(self, sample_ns: int | None = None) -> int:
         """The time by which alarms count [ns]; `sample_ns` is that of a sample that has come."""
@@ -310,13 +322,17 @@ class MonitorProcess:
         yield from self._reports_of_others()
         yield from self._keys.reports(seen)
 
-    def _reports_of_others(self) -> Iterator[Report]:
-        """Those of what daq and recorder have said last, and of the journal."""
+    def _reports_of_others(self, *, why: bool = True) -> Iterator[Report]:
+        """The alarms of what daq and recorder have said last, and of the journal.
+
+        Args:
+            why: with the reason of an absence, which asks for the router.
+        """
         unjudged = self._delivered_s - self._estimated_s
         yield from device_reports(self._daq, unjudged, self._unsuitable)
         failure = self._journal.failure if self._journal else ""
         there = self._recorder_presence.holds(time.monotonic())
-        absence = "" if there else self._absence("recorder")
+        absence = "" if there else self._absence("recorder") if why else ABSENT
         yield from disk_reports(self._recorder, absence, failure)
 
     def _announce_router(self, seen: Seen) -> None:

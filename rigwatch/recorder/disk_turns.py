@@ -7,9 +7,9 @@ cost the disk little more than one: 300 take as long as three, one after the oth
 """
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor, wait
-from contextlib import nullcontext, suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from functools import partial
 from pathlib import Path
 from typing import Protocol
@@ -20,6 +20,7 @@ PART = 50
 """Rigs in a part of a turn, at least, if there are so many."""
 MOST_SYNCS = 64
 """Files of a disk that are synced at the same time."""
+Together = Callable[[], AbstractContextManager[object]]
 
 
 class Turn(Protocol):
@@ -44,9 +45,14 @@ def take_turns(turn: Turn, every: float, stop: threading.Event) -> None:
 
 
 class DiskTurns:
-    """The turns of a process's recordings, apart for each disk."""
+    """The turns of a process's recordings, apart for each disk.
 
-    def __init__(self) -> None:
+    Args:
+        together: entered for each part of a turn, so that what it sends leaves together.
+    """
+
+    def __init__(self, together: Together = nullcontext) -> None:
+        self._together = together
         self._turns: dict[tuple[int, float], Turns] = {}
         self._lock = threading.Lock()
 
@@ -71,7 +77,7 @@ class DiskTurns:
             if (disk, every) not in self._turns:
                 syncs = ThreadPoolExecutor(MOST_SYNCS, "sync")
                 before = partial(_begin_all, syncs)
-                self._turns[disk, every] = Turns(every, nullcontext, before=before, part=PART)
+                self._turns[disk, every] = Turns(every, self._together, before=before, part=PART)
             return self._turns[disk, every]
 
 

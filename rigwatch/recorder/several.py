@@ -63,7 +63,8 @@ def run_several(paths: list[Path], stop: threading.Event, notes: str = "") -> li
     folders: dict[Path, Path] = {}
     valid_rigs(paths)  # a wrong file is named by its rig's thread
     keep_memory_tidy(stop)
-    links, disks = SharedLinks(len(paths)), DiskTurns()
+    links = SharedLinks(len(paths))
+    disks = DiskTurns(links.together)
     parts = [
         Part(str(path), work_of(path, notes, folders, links, disks), partial(used, path))
         for path in paths

@@ -13,8 +13,12 @@ import numpy as np
 from rigwatch.wire.arrays import IntArray
 from rigwatch.wire.kept_state import KeptState, kept
 from rigwatch.wire.kernel import kernel, part
-from rigwatch.wire.messages import ByteArray, Layout, Numbers, gather_with
+from rigwatch.wire.messages import ByteArray, Layout, Numbers, gather_with, keep_layouts
 from rigwatch.wire.packed_numbers import filling_number, word_at
+
+MANY_LAYOUTS, LAYOUTS_ROOM = 512, 1 << 20
+"""Layouts that are kept, and the sum of their blocks' sizes [bytes]: blocks of many rigs have all
+lengths of a busy machine at once, and one without a layout is read slowly with those around it."""
 
 
 class Places(NamedTuple):
@@ -48,6 +52,7 @@ def join_quickly() -> None:
     # Compiled before the first message arrives.
     join_run(like, none, data, none, 0, 0, empty, empty.astype(np.uint8))
     gather_with(gathered)
+    keep_layouts(MANY_LAYOUTS, LAYOUTS_ROOM)
 
 
 def gathered(layouts: Sequence[Layout], payloads: Sequence[bytes], seq: int) -> Numbers | None:

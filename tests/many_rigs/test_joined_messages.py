@@ -14,10 +14,12 @@ from rigwatch.wire.delivery import SampleReader, SampleRing
 from rigwatch.wire.messages import (
     ESTIMATES,
     EVENTS,
+    HEALTH,
     SAMPLES,
     Column,
     EstimateBlock,
     Event,
+    Health,
     SampleBlock,
     encode,
 )
@@ -102,6 +104,20 @@ def read_until(reader: SampleReader, found: list[object], last: int) -> None:
     eventually(there, f"sample {last}")
 
 
+def hear_first(source: Source, readers: list[SampleReader]) -> list[list[object]]:
+    """What each reader hears until all hear the source: a router may be slow to learn of them."""
+    found: list[list[object]] = [[] for _ in readers]
+
+    def all_hear() -> bool:
+        source.turn()
+        for reader, items in zip(readers, found, strict=True):
+            items.extend(reader.read(0.02))
+        return all(map(numbers, found))
+
+    eventually(all_hear, "the first samples")
+    return found
+
+
 def test_rigs_of_one_process_are_heard_whole_by_processes_of_many_and_of_one(
     base: TestRig, configs: list[RigConfig], several: Callable[[], Several]
 ) -> None:
@@ -109,15 +125,12 @@ def test_rigs_of_one_process_are_heard_whole_by_processes_of_many_and_of_one(
     source = Source([sending.join(config, "daq") for config in configs], sending.links)
     readers = [SampleReader(hearing.join(config, "monitor")) for config in configs]
     readers.append(SampleReader(base.bus("alone", configs[1])))
-    found: list[list[object]] = [[] for _ in readers]
-    source.turn()
-    for reader, items in zip(readers, found, strict=True):
-        read_until(reader, items, 8)
+    found = hear_first(source, readers)
     for _ in range(40):
         source.turn()
     for reader, items in zip(readers, found, strict=True):
-        read_until(reader, items, 41 * 9 - 1)
-        assert numbers(items) == list(range(numbers(items)[0], 41 * 9))
+        read_until(reader, items, source.sent - 1)
+        assert numbers(items) == list(range(numbers(items)[0], source.sent))
         counted = reader.counters
         assert counted.lost == counted.duplicates == counted.foreign == reader.rejected == 0
 
@@ -144,12 +157,20 @@ def test_a_rig_of_its_own_process_is_heard_by_a_process_of_many(
     hearing = several()
     bus = base.bus("daq", configs[0])
     ring, reader = SampleRing(bus, 4096), SampleReader(hearing.join(configs[0], "monitor"))
-    for seq in range(200):
-        ring.add(block(seq))
-        bus.publish(SAMPLES, block(seq))
     found: list[object] = []
-    read_until(reader, found, 199)
-    assert numbers(found) == list(range(numbers(found)[0], 200))
+    sent = 0
+
+    def heard() -> bool:
+        nonlocal sent
+        for seq in range(sent, sent := sent + 200):
+            ring.add(block(seq))
+            bus.publish(SAMPLES, block(seq))
+        found.extend(reader.read(0.02))
+        return bool(numbers(found))
+
+    eventually(heard, "the first samples")
+    read_until(reader, found, sent - 1)
+    assert numbers(found) == list(range(numbers(found)[0], sent))
     assert reader.counters.duplicates == reader.counters.lost == 0
 
 
@@ -178,6 +199,53 @@ def test_estimates_of_several_rigs_are_heard_each_once_and_in_order(
         assert listener.lost == listener.foreign == listener.rejected == 0
 
 
+def test_health_of_several_rigs_is_one_message_for_processes_of_many_and_each_ones_own(
+    base: TestRig, configs: list[RigConfig], several: Callable[[], Several]
+) -> None:
+    sending, hearing, joint = several(), several(), list[bytes]()
+    daqs = [sending.join(config, "daq") for config in configs]
+    listeners = [hearing.join(config, "monitor").subscribe_own(HEALTH, "daq") for config in configs]
+    alone = base.bus("alone", configs[1]).subscribe(HEALTH)
+    base.bus("ear").transport.listen_from(
+        joint_key(HEALTH.key_of("daq")), lambda payload, *_: joint.append(payload)
+    )
+    listeners.append(alone)
+    heard: list[list[int]] = [[] for _ in listeners]
+    sent = 0
+
+    def all_hear() -> bool:
+        nonlocal sent
+        with sending.links.together():
+            for daq in daqs:
+                daq.publish(HEALTH, Health("daq", sent, "running", "", {"samples": 1.0}))
+        sent += 1
+        for listener, times in zip(listeners, heard, strict=True):
+            one = listener.get(timeout=0.2)
+            if one is not None:
+                times.append(one.t_ns)
+        return all(len(times) > 3 for times in heard)
+
+    eventually(all_hear, "the health of each rig")
+    for times in heard:
+        assert times == [*range(times[0], times[0] + len(times))]
+    assert any([rig for rig, _, _ in split(one)] == [*RIGS] for one in tuple(joint))
+
+
+def test_health_of_a_rig_of_its_own_process_is_heard_by_a_process_of_many(
+    base: TestRig, configs: list[RigConfig], several: Callable[[], Several]
+) -> None:
+    bus = base.bus("daq", configs[0])
+    listener = several().join(configs[0], "monitor").subscribe_own(HEALTH, "daq")
+
+    def heard() -> bool:
+        bus.publish(HEALTH, Health("daq", 1, "running", "", {}))
+        return len(listener) > 0
+
+    eventually(heard, "its health")
+    assert {one.source for one in listener.drain()} == {"daq"}
+    assert listener.rejected == 0
+
+
 def estimate(seq: int) -> EstimateBlock:
     column = Column("residual", "m/s^2", np.array([float(seq)]))
     return EstimateBlock("rig", 7, seq, np.array([seq], np.int64), (column,))
@@ -191,18 +259,17 @@ def test_nobody_speaks_for_a_rig_in_a_joined_message_but_its_owner(
     bus = hearing.join(configs[0], "monitor")
     reader, stranger = SampleReader(bus), base.bus("stranger", configs[0])
     events = stranger.subscribe(EVENTS)
-    found: list[object] = []
-    source.turn()
-    read_until(reader, found, 8)
-    forged = join([("a", b"", encode(block(9, 3))), ("unknown", b"", b"?"), ("a", b"", b"rubbish")])
+    (found,) = hear_first(source, [reader])
+    next_one = encode(block(source.sent, 3))
+    forged = join([("a", b"", next_one), ("unknown", b"", b"?"), ("a", b"", b"rubbish")])
     for payload in (forged, b"rubbish"):
         stranger.transport.put(joint_key(SAMPLES.key), payload)
     eventually(lambda: found.extend(reader.read(0.02)) or reader.rejected == 2, "rejected")
     assert reader.counters.foreign == 3
     assert [*reader.rejected_by] == [stranger.identity]
     source.turn()
-    read_until(reader, found, 17)
-    assert numbers(found) == list(range(numbers(found)[0], 18))
+    read_until(reader, found, source.sent - 1)
+    assert numbers(found) == list(range(numbers(found)[0], source.sent))
     told = [item.code for item in found if isinstance(item, Event)]
     assert told.count("DUPLICATE SOURCE") == 1
     codes: list[str] = []
@@ -220,10 +287,7 @@ def test_what_a_joined_message_lost_is_fetched_for_every_rig(
     router = base.router()
     source = Source([sending.join(config, "daq") for config in configs], sending.links)
     readers = [SampleReader(hearing.join(config, "monitor")) for config in configs]
-    found: list[list[object]] = [[] for _ in readers]
-    source.turn()
-    for reader, items in zip(readers, found, strict=True):
-        read_until(reader, items, 8)
+    found = hear_first(source, readers)
     kill(router)
     for _ in range(5):
         source.turn()
@@ -231,8 +295,8 @@ def test_what_a_joined_message_lost_is_fetched_for_every_rig(
     eventually(lambda: all(bus.connected() for bus in (*sending.buses, *hearing.buses)), "a link")
     source.turn()
     for reader, items in zip(readers, found, strict=True):
-        read_until(reader, items, 7 * 9 - 1)
-        assert numbers(items) == list(range(numbers(items)[0], 7 * 9))
+        read_until(reader, items, source.sent - 1)
+        assert numbers(items) == list(range(numbers(items)[0], source.sent))
         assert reader.counters.lost == 0
         assert reader.counters.recovered > 0
 
@@ -247,11 +311,11 @@ def test_with_keys_nothing_is_joined_and_everything_heard(tmp_path: Path) -> Non
     sending, hearing = Several(), Several()
     source = Source([sending.join(config, "daq")], sending.links)
     reader = SampleReader(hearing.join(config, "monitor"))
-    found: list[object] = []
+    (found,) = hear_first(source, [reader])
     for _ in range(10):
         source.turn()
-    read_until(reader, found, 89)
-    assert numbers(found) == list(range(numbers(found)[0], 90))
+    read_until(reader, found, source.sent - 1)
+    assert numbers(found) == list(range(numbers(found)[0], source.sent))
     assert reader.counters.lost == reader.rejected == 0
     for process in (sending, hearing):
         process.close()

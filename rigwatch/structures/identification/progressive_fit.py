@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigwatch.physics.engine.fit import Recording
 from rigwatch.structures.identification.least_squares import Step
 from rigwatch.structures.identification.problem import Problem
 from rigwatch.structures.identification.whole_record import WholeRecord
@@ -93,5 +92,5 @@ def _prolonged(
 
 def _beginning(problem: Problem, samples: int) -> Problem:
     recording, last = problem.recording, problem.first + samples
-    part = Recording(recording.dt, recording.inputs[:last], recording.outputs[:last])
+    part = recording.stretch(0, last)
     return replace(problem, recording=part, weight=problem.weight[:samples])

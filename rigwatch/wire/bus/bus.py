@@ -60,11 +60,10 @@ class Bus(Member):
 
     def _subscribed(self, topic: Topic, keys: Iterable[str], capacity: int) -> Subscription:
         found = Subscription(topic, capacity)
-        ends = [self.transport.listen_from(self.key(key), found.receive) for key in keys]
-
-        def close() -> None:
-            for end in ends:
-                end()
-
-        found._close = close
+        for key in keys:
+            # Of what is frequent, more may be lost among other rigs' than this reader counts.
+            if topic.joined and topic.is_rare:
+                found.follow(*self.transport.listen_among(self.rig, key, found.receive))
+            else:
+                found.follow(None, self.transport.listen_from(self.key(key), found.receive))
         return found

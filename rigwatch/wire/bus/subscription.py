@@ -6,15 +6,14 @@ from collections.abc import Iterator
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from rigwatch.wire.bus.transport import MAX_PAYLOAD, Close
+from rigwatch.wire.bus.inbox import LOOK_EVERY
+from rigwatch.wire.bus.transport import MAX_PAYLOAD, Close, Waiting
 from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import Topic, decode
 from rigwatch.wire.ordering import SenderRates
 
 MOST_COMMANDS = 8
 """Operators' commands executed per turn of a loop, so that a flood of them delays nothing else."""
-MOST_LIMITED = 1.0
-"""Rate in normal running up to which a topic's messages are few [Hz]."""
 QUEUE_CAPACITY = 4096
 """Number of messages queued for a slow reader before the oldest are dropped."""
 
@@ -34,12 +33,24 @@ class Subscription:
         self.dropped = 0
         self.rejected = 0
         self._capacity = capacity
-        self._rates = SenderRates() if topic.rate_hz <= MOST_LIMITED else None
+        self._rates = SenderRates() if topic.is_rare else None
         self._waiting: SimpleQueue[tuple[bytes, str]] = SimpleQueue()
-        self._close: Close = lambda: None
+        self._outside: list[Waiting] = []
+        self._ends: list[Close] = []
 
     def __len__(self) -> int:
+        self._look_outside()
         return self._waiting.qsize()
+
+    def follow(self, outside: Waiting | None, end: Close) -> None:
+        """Read what waits there as well, None if it is received as it comes; `end` closes it."""
+        self._ends.append(end)
+        if outside is not None:
+            self._outside.append(outside)
+
+    def _look_outside(self) -> None:
+        for one in self._outside:
+            one.take()
 
     @property
     def refused(self) -> int:
@@ -70,11 +81,22 @@ class Subscription:
 
     def _next(self, timeout: float | None) -> tuple[Any, str] | None:
         """The same with the identity of its sender."""
-        deadline = None if timeout is None else time.monotonic() + timeout
+        until = float("inf") if timeout is None else time.monotonic() + timeout
+        self._look_outside()
+        while (found := self._queued(until)) is None and time.monotonic() < until:
+            self._look_outside()
+        return found
+
+    def _queued(self, until: float = 0.0) -> tuple[Any, str] | None:
+        """The next valid one that has been received, by monotonic time `until` [s]."""
         while True:
-            left = None if deadline is None else max(0.0, deadline - time.monotonic())
+            left = max(0.0, until - time.monotonic())
+            # What waits outside does not wake its reader.
+            wait = min(left, LOOK_EVERY) if self._outside else left
             try:
-                payload, sender = self._waiting.get(block=left != 0.0, timeout=left)
+                payload, sender = self._waiting.get(
+                    block=wait > 0.0, timeout=None if wait == float("inf") else wait
+                )
             except Empty:
                 return None
             with contextlib.suppress(MessageError):
@@ -87,14 +109,13 @@ class Subscription:
         Args:
             most: number of messages taken from the queue; None for all.
         """
-        waiting = self._waiting.qsize()
-        count = waiting if most is None else min(most, waiting)
-        found = [self.get(timeout=0) for _ in range(count)]
-        return [message for message in found if message is not None]
+        return [message for message, _ in self.drain_from(most)]
 
-    def drain_from(self) -> list[tuple[Any, str]]:
-        """The waiting messages, oldest first, each with the identity of its sender."""
-        found = [self._next(timeout=0) for _ in range(self._waiting.qsize())]
+    def drain_from(self, most: int | None = None) -> list[tuple[Any, str]]:
+        """The same, each with the identity of its sender."""
+        waiting = len(self)
+        count = waiting if most is None else min(most, waiting)
+        found = [self._queued() for _ in range(count)]
         return [one for one in found if one is not None]
 
     def __iter__(self) -> Iterator[Any]:
@@ -103,4 +124,5 @@ class Subscription:
 
     def close(self) -> None:
         """Stop receiving."""
-        self._close()
+        for end in self._ends:
+            end()

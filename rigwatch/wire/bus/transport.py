@@ -119,10 +119,11 @@ def send(
     transport: Transport, rig: str, topic: Topic, process: str, payload: bytes, *, mark: bytes = b""
 ) -> None:
     """Send a message of a topic as `process` of a rig."""
+    key = topic.key_of(process)
     if topic.joined:
-        transport.put_among(rig, topic.key, payload, mark)
+        transport.put_among(rig, key, payload, mark)
     else:
-        transport.put(bus_key(rig, topic.key_of(process)), payload, mark)
+        transport.put(bus_key(rig, key), payload, mark)
 
 
 def answered(answer: Answer, question: bytes) -> list[bytes]:

@@ -62,7 +62,7 @@ from rigwatch.wire.messages.newest_alarms import (
     told_again,
     transitions,
 )
-from rigwatch.wire.messages.packed import UNFAMILIAR, decode_block, layout_of
+from rigwatch.wire.messages.packed import UNFAMILIAR, decode_block, keep_layouts, layout_of
 from rigwatch.wire.messages.packed_encoding import estimate_heads, estimate_tags, source_bytes
 from rigwatch.wire.messages.quality_flags import (
     NON_FINITE,
@@ -171,6 +171,7 @@ __all__ = [
     "is_remembered",
     "is_source",
     "json_fields",
+    "keep_layouts",
     "layout_of",
     "merged",
     "pieces",

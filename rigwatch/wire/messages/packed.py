@@ -53,6 +53,11 @@ UNFAMILIAR = (UnfamiliarError, IndexError, ValueError)
 _layouts: Recent[tuple[type[Any], int, int], Layout] = Recent(MOST_LAYOUTS, LAYOUTS_ROOM)
 
 
+def keep_layouts(most: int, room: int) -> None:
+    """Keep this many layouts in a generation, with this sum of their blocks' sizes [bytes]."""
+    _layouts.grow(most, room)
+
+
 def decode_block(kind: type[K], data: bytes) -> K:
     """Decode a block; its arrays may be unaligned views of `data`.
 

@@ -22,6 +22,10 @@ class Recent(Generic[K, V]):
         self._most, self._room = most, room
         self.clear()
 
+    def grow(self, most: int, room: int) -> None:
+        """Keep this much in a generation from now on."""
+        self._most, self._room = most, room
+
     def clear(self) -> None:
         """Forget everything."""
         self._young: dict[K, tuple[V, int]] = {}

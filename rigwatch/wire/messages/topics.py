@@ -15,6 +15,9 @@ from rigwatch.wire.messages.message_types import (
     SampleBlock,
 )
 
+MOST_RARE = 1.0
+"""Rate in normal running up to which a topic's messages are few [Hz]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Topic:
@@ -45,6 +48,11 @@ class Topic:
     joined: bool = False
     owned_by: tuple[str, ...] = ()
 
+    @property
+    def is_rare(self) -> bool:
+        """Whether its messages are few in normal running."""
+        return self.rate_hz <= MOST_RARE
+
     def key_of(self, process: str) -> str:
         """Key at which a process sends."""
         return f"{self.key}/{process}" if process in self.owned_by else self.key
@@ -63,7 +71,10 @@ ESTIMATES = Topic(
 ALARMS = Topic("alarms", "monitor/alarms", Alarm, "monitor", 0.0, recorded=True, numbered=True)
 COMMANDS = Topic("commands", "monitor/commands", AlarmCommand, "operator", 0.0, recorded=True)
 GAPS = Topic("gaps", "gaps", Gap, "any", 0.0, recorded=True, owned_by=("recorder",))
-HEALTH = Topic("health", "health", Health, "any", 1.0, recorded=True, owned_by=("daq", "recorder"))
+HEALTH = Topic(
+    "health", "health", Health, "any", 1.0,
+    recorded=True, joined=True, owned_by=("daq", "recorder"),
+)  # fmt: skip
 EVENTS = Topic("events", "events", Event, "any", 0.0, recorded=True)
 RUN = Topic("run", "run", RunInfo, "recorder", 0.0, recorded=True)
 MODELS = Topic(

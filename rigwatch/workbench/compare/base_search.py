@@ -13,7 +13,7 @@ Along the measured motion every candidate is fitted briefly, to the beginning of
 from dataclasses import dataclass, replace
 
 from rigwatch.physics.engine.equations import check_variants
-from rigwatch.physics.engine.fit import Recording, of_parts
+from rigwatch.physics.engine.fit import Recording
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.base_fit import Base
 from rigwatch.workbench.compare.base_step import AT_NOISE, BaseSearch, improves
@@ -92,27 +92,20 @@ def _split_healthy(healthy: Recording, horizon: int) -> Data:
     """Splits the healthy data: the last of several recordings, or the end of one, is held out."""
     parts = healthy.parts or (len(healthy),)
     if len(parts) > 1:
-        cut, first, rest = sum(parts[:-1]), parts[:-1], parts[-1:]
+        cut = sum(parts[:-1])
     else:
         cut = max(round(FIT_SHARE * len(healthy)) // horizon, 1) * horizon
-        first, rest = (cut,), (len(healthy) - cut,)
-    if rest[0] < horizon:
+    if len(healthy) - cut < horizon:
         raise ModelError(
             f"healthy: found {len(healthy) * healthy.dt:.3g} s, expected at least two horizons of"
             f" {horizon * healthy.dt:g} s: one to fit and one that decides"
         )
-    fitted, judged = _cut(healthy, 0, cut, first), _cut(healthy, cut, None, rest)
+    fitted, judged = _cut(healthy, 0, cut), _cut(healthy, cut, len(healthy))
     # As in every other step the whole healthy motion determines the sensors' lateness and corner.
     return Data(fitted, judged, healthy, horizon, ())
 
 
-def _cut(whole: Recording, begin: int, end: int | None, parts: tuple[int, ...]) -> Recording:
-    thinning = replace(whole.thinning, parts=parts) if whole.thinning else None
-    own = whole.own_spacings[: len(parts)] if begin == 0 else whole.own_spacings[-len(parts) :]
-    dt, spacings = of_parts(own, parts)
-    inputs, outputs = whole.inputs[begin:end], whole.outputs[begin:end]
-    breaks = tuple(at - begin for at in whole.breaks if 0 <= at - begin < len(inputs))
-    return replace(
-        whole, dt=dt, inputs=inputs, outputs=outputs, thinning=thinning, parts=parts, breaks=breaks,
-        spacings=spacings,
-    )  # fmt: skip
+def _cut(whole: Recording, begin: int, end: int) -> Recording:
+    cut = whole.stretch(begin, end)
+    thinning = replace(whole.thinning, parts=cut.parts) if whole.thinning else None
+    return replace(cut, thinning=thinning)

@@ -240,7 +240,8 @@ def _nothing_found(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> V
     # With effects in the model, a little above the least that the noise can be tells nothing.
     if base.placements and noise and ratio < NEAR:
         return Verdict("nothing_missing", None, (), (), text + noise)
-    text = f"the held-out error is {ratio:.2f} times the noise floor, and no known effect lowers it"
+    text = f"the held-out error is {ratio:.2f} times the noise floor, and no "
+    text += "known effect lowers it" if rows else "further known effect suits the model's ports"
     fitted = [row for row in rows if row.fitted is not None]
     if fitted:
         nearest = min(fitted, key=lambda row: row.held_out_error)

@@ -139,10 +139,7 @@ def _split(healthy: Recording, horizon: int) -> Data:
     cut = max(round(FIT_SHARE * windows), 1) * horizon
     if cut >= len(healthy):
         return Data(healthy, healthy, None, horizon, ())
-    first, rest = (
-        Recording(healthy.dt, healthy.inputs[part], healthy.outputs[part])
-        for part in (slice(cut), slice(cut, None))
-    )
+    first, rest = healthy.stretch(0, cut), healthy.stretch(cut, len(healthy))
     return Data(first, rest, None, horizon, ())
 
 

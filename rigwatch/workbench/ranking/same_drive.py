@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.signal import correlate
 
-from rigwatch.physics.engine.fit import Recording
+from rigwatch.physics.engine.fit import Recording, apart
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.workbench.data import Data, bridged
 from rigwatch.workbench.study import Study
@@ -68,13 +68,13 @@ def _pairs(
     healthy: Recording, test: Recording, drive: slice
 ) -> Iterator[tuple[Recording, Recording]]:
     """What every healthy recording shares with every other one, shifted to where drives agree."""
-    for one in _parts(healthy):
-        for other in _parts(test):
+    for one in apart(healthy):
+        for other in apart(test):
             ahead = _shift(one.inputs[:, drive], other.inputs[:, drive])
             first, second = max(ahead, 0), max(-ahead, 0)
             n = min(len(one) - first, len(other) - second)
             if n >= LEAST * min(len(one), len(other)):
-                yield _cut(one, first, first + n), _cut(other, second, second + n)
+                yield one.stretch(first, first + n), other.stretch(second, second + n)
 
 
 def _shift(healthy: FloatArray, test: FloatArray) -> int:
@@ -84,18 +84,6 @@ def _shift(healthy: FloatArray, test: FloatArray) -> int:
         if (size := one.std() * other.std()) > 0.0:
             found += correlate(one - one.mean(), other - other.mean(), method="fft") / size
     return int(np.argmax(found)) - (len(test) - 1)
-
-
-def _parts(recording: Recording) -> Iterator[Recording]:
-    begin = 0
-    for length in recording.parts or (len(recording),):
-        yield _cut(recording, begin, begin + length)
-        begin += length
-
-
-def _cut(recording: Recording, begin: int, end: int) -> Recording:
-    rows = slice(begin, end)
-    return Recording(recording.dt, recording.inputs[rows], recording.outputs[rows])
 
 
 def _driven(healthy: FloatArray, test: FloatArray) -> BoolArray | None:

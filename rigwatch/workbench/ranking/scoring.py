@@ -101,6 +101,8 @@ def scored(
         found: the candidates; each row keeps the shape that matches the residual best.
         every: include effects whose strength would be outside its bounds.
     """
+    if not found:
+        return []
     scores = score_all(data, base, found)
     fitted = _scored_fit(base)
     p_values = corrected_p_values(scores, fitted.residuals / fitted.scale)

@@ -18,9 +18,11 @@ from rigwatch.wire.delivery import SampleRing
 from rigwatch.wire.messages import (
     ALARMS,
     ESTIMATES,
+    HEALTH,
     SAMPLES,
     Alarm,
     EstimateBlock,
+    Health,
     SampleBlock,
     cut,
 )
@@ -241,6 +243,33 @@ def test_a_rig_of_a_table_that_fails_starts_anew_and_no_other_notices(sides, mon
         assert sorted(table.values(number)) == [(1, seq) for seq in range(last + 1)]
     (said,) = table.remarks
     assert said.endswith("the disk is gone; starts anew in 0 s")
+
+
+def test_rigs_stay_in_their_table_while_nothing_is_recorded(sides) -> None:
+    _, table = sides
+    links = MemoryLinks(table.network)
+    recorders = [links.bus(f"r{number}", "recorder") for number in range(4)]
+    rigs = [[*sent(undisturbed(), seed, 0.0, 10**9)][:300] for seed in range(4)]
+    said = {0: "recording", 100: "not recording", 200: "recording"}
+    meanwhile = 0
+    for turn, blocks in enumerate(zip(*rigs, strict=False)):
+        if turn in said:
+            full = float(said[turn] != "recording")
+            counters = {"free_share": 0.5, "disk_trouble": full}
+            with links.together():
+                for bus in recorders:
+                    health = Health("recorder", time.time_ns(), said[turn], "", counters)
+                    bus.publish(HEALTH, health)
+        table.send([*blocks])
+        table.turn()
+        if 120 <= turn < 200:
+            meanwhile += sum(seat.is_in_table for seat in table.seats)
+    assert meanwhile > 0.5 * 4 * 80
+    for number in range(4):
+        found = [one.state for one in table.said[number] if one.name == "recording_stopped"]
+        assert found == ["unacknowledged", "cleared_unacknowledged"]
+        assert sorted(table.values(number)) == [(1, seq) for seq in range(_end(rigs[number]) + 1)]
+    assert not table.remarks
 
 
 def _fail(*_: object) -> None:

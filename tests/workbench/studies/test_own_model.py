@@ -61,6 +61,14 @@ def test_without_ports_it_is_compared_and_explain_asks_for_one(tmp_path: Path) -
         explain(study)
 
 
+def test_with_a_port_that_no_effect_suits_the_error_is_unknown(tmp_path: Path) -> None:
+    bare = PORT.replace('variables.v = { expression = "v", unit = "rad/s" }', "passive = true")
+    found = explain(motor(tmp_path, SPEED + bare))
+    assert found.verdict == "unknown_effect"
+    assert not found.ranking
+    assert "no further known effect suits the model's ports" in found.text
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

@@ -165,8 +165,17 @@ def test_what_may_be_it_and_cannot_be_fitted_is_not_passed_over_in_silence() -> 
 
 
 def test_what_no_effect_lowers_is_unknown() -> None:
-    found = judge(base(2.0), [], PERIODS)
+    found = judge(base(2.0), [row("a@x", fitted=False)], PERIODS)
     text = "the held-out error is 2.00 times the noise floor, and no known effect lowers it"
+    assert found == Verdict("unknown_effect", None, (), (), text)
+
+
+def test_where_no_effect_suits_the_ports_that_is_said() -> None:
+    found = judge(base(2.0), [], PERIODS)
+    text = (
+        "the held-out error is 2.00 times the noise floor, and no further known effect suits the"
+        " model's ports"
+    )
     assert found == Verdict("unknown_effect", None, (), (), text)
 
 

@@ -87,6 +87,23 @@ class Recording:
         first = np.array([part.start for part in self.slices], np.int64)
         return np.repeat(first, self.parts or (len(self),))
 
+    def stretch(self, begin: int, end: int) -> "Recording":
+        """The samples from `begin` to before `end`; their residuals are not thinned."""
+        own = [(max(one.start, begin), min(one.stop, end)) for one in self.slices]
+        kept = [(last - first, k) for k, (first, last) in enumerate(own) if last > first]
+        lengths, numbers = zip(*kept, strict=True)
+        dt, spacings = of_parts([self.own_spacings[k] for k in numbers], lengths)
+        return replace(
+            self,
+            dt=dt,
+            inputs=self.inputs[begin:end],
+            outputs=self.outputs[begin:end],
+            thinning=None,
+            parts=lengths,
+            breaks=tuple(at - begin for at in self.breaks if begin <= at < end),
+            spacings=spacings,
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Windows:
@@ -156,14 +173,7 @@ def joined(recordings: Sequence[Recording]) -> Recording:
 
 def apart(recording: Recording) -> list[Recording]:
     """Each of the concatenated recordings by itself; the residuals of none are thinned."""
-    return [
-        replace(
-            recording, dt=dt, inputs=recording.inputs[own], outputs=recording.outputs[own],
-            thinning=None, parts=(own.stop - own.start,), spacings=(),
-            breaks=tuple(at - own.start for at in recording.breaks if own.start <= at < own.stop),
-        )
-        for own, dt in zip(recording.slices, recording.own_spacings, strict=True)
-    ]  # fmt: skip
+    return [recording.stretch(own.start, own.stop) for own in recording.slices]
 
 
 def of_parts(spacings: Sequence[float], lengths: Sequence[int]) -> tuple[float, tuple[float, ...]]:

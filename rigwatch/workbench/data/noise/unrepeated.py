@@ -71,8 +71,7 @@ def exact_period(recording: Recording, own: slice) -> float:
         recording: the recordings.
         own: samples of the one.
     """
-    inputs = recording.inputs[own]
-    alone = Recording(recording.dt, inputs, recording.outputs[own], driving=recording.driving)
+    alone = recording.stretch(own.start, own.stop)
     drive = alone.excitation
     near = repeat_of(alone)
     if not near or not np.isfinite(drive).all():
