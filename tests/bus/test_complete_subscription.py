@@ -142,7 +142,7 @@ def test_messages_that_wait_together_are_taken_as_one_by_one(monkeypatch) -> Non
 
 @pytest.mark.parametrize(
     ("patient", "expected"),
-    [(False, [0.5, 1.0, 1.5, 2.0, 2.5]), (True, [0.5, 1.5, 3.5, 7.5, 11.5])],
+    [(False, [0.5, 1.0, 1.5, 2.0, 2.5]), (True, [0.5, 1.5, 3.5, 7.5, 15.5, 31.5, 47.5])],
 )
 def test_the_longer_nothing_comes_the_less_often_a_patient_reader_asks(
     monkeypatch, patient: bool, expected: list[float]

@@ -41,7 +41,7 @@ from rigwatch.wire.ordering import (
 
 SILENCE = 0.5
 """Time without a message after which the rings are queried for more [s]."""
-LONGEST_SILENCE = 4.0
+LONGEST_SILENCE = 16.0
 """The same for a patient reader, whose queries are the rarer the longer nothing comes: what a rig
 rarely says would otherwise be asked for all the time, and each query wakes three processes [s]."""
 MOST_SENDERS = 16
