@@ -12,13 +12,17 @@ import contextlib
 import math
 import os
 import sys
-from collections.abc import Iterator
-from dataclasses import dataclass
+from array import array
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+
+import numpy as np
 
 from rigwatch.recorder.positions import FILES
 from rigwatch.recorder.retention.age_clock import EARLIEST_NS
-from rigwatch.recorder.retention.rules import expired
+from rigwatch.recorder.retention.rules import Facts, places_expired
 from rigwatch.recorder.session_list import sessions_of
 from rigwatch.wire.messages import ALARMS, Event
 from rigwatch.wire.rig_config import RecorderSection
@@ -30,22 +34,58 @@ EVERY = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A segment on the disk: folder, name, end as Unix time [s], size [bytes], whether it has
-    alarms.
-
-    Years have thousands: the texts of folders and names are shared.
-    """
+    """A segment on the disk: folder, name, size [bytes]."""
 
     folder: str
     name: str
-    ended: float
     size: int
-    alarms: bool
 
     @property
     def path(self) -> Path:
         """Its file."""
         return Path(self.folder, self.name)
+
+
+@dataclass
+class _Listing:
+    """Closed segments, a column for each fact: years have thousands.
+
+    Attributes:
+        folders: with the number of the first segment of each, and of the one after its last.
+        names: of the segments.
+        ended: their ends as Unix time [ns].
+        size: theirs [bytes].
+        alarms: whether each has some.
+    """
+
+    folders: list[tuple[str, int, int]] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+    ended: "array[int]" = field(default_factory=lambda: array("q"))
+    size: "array[int]" = field(default_factory=lambda: array("q"))
+    alarms: bytearray = field(default_factory=bytearray)
+
+    @property
+    def facts(self) -> Facts:
+        """What decides."""
+        return Facts(
+            np.array(self.ended) / 1e9, np.array(self.size), np.array(self.alarms, np.bool_)
+        )
+
+    def size_in(self, folder: str) -> int:
+        """Size of the segments in a folder [bytes]."""
+        return sum(sum(self.size[first:end]) for one, first, end in self.folders if one == folder)
+
+    def segments(self, places: Iterable[int]) -> list[Segment]:
+        """The segments at these places."""
+        firsts = [first for _, first, _ in self.folders]
+        return [
+            Segment(
+                self.folders[bisect_right(firsts, place) - 1][0],
+                self.names[place],
+                self.size[place],
+            )
+            for place in places
+        ]
 
 
 class Retention:
@@ -84,28 +124,38 @@ class Retention:
         """Segments to be removed, oldest first, those without alarms before those with alarms."""
         newest = _newest(current)
         kept = _size(newest) if newest else 0
-        found = list(self._segments(newest, now_s))
-        size = kept + _size_in(current, found)
+        found = self._listed(newest, now_s)
+        size = kept + found.size_in(str(current))
         room = int(max(0.0, size - self._left))
-        gone = expired(found, self._settings, now_s, kept + room)
-        self._left = size - _size_in(current, gone)
+        gone = found.segments(places_expired(found.facts, self._settings, now_s, kept + room))
+        self._left = size - sum(one.size for one in gone if one.folder == str(current))
         return gone
 
-    def _segments(self, newest: Path | None, now_s: float) -> Iterator[Segment]:
-        before, self._alarms = self._alarms, {}  # others remove segments too
+    def _listed(self, newest: Path | None, now_s: float) -> _Listing:
+        """The segments of the rig but the newest, which is being written."""
+        found = _Listing()
         for path in sessions_of(Path(self._settings.folder), self._rig):
-            folder = str(path)
-            found = list(_segments_in(folder))
-            dated = (ended_ns for _, ended_ns, _ in found if ended_ns >= EARLIEST_NS)
-            otherwise = max(dated, default=now_s * 1e9)
-            known = before.get(folder, {})
-            for name, ended_ns, size in found:
-                if newest is not None and newest.name == name and newest.parent == path:
-                    continue
-                alarms = known[name] if name in known else _has_alarms(path / name)
-                self._alarms.setdefault(folder, {})[name] = alarms
-                ended = (ended_ns if ended_ns >= EARLIEST_NS else otherwise) / 1e9
-                yield Segment(folder, name, ended, size, alarms)
+            first = len(found.names)
+            _list_segments(path, newest, found)
+            found.folders.append((str(path), first, len(found.names)))
+            _date(found.ended, first, now_s)
+            found.alarms += bytes(self._have_alarms(path, found.names[first:]))
+        for gone in self._alarms.keys() - {folder for folder, *_ in found.folders}:
+            del self._alarms[gone]  # others remove segments too
+        return found
+
+    def _have_alarms(self, folder: Path, names: Sequence[str]) -> Iterator[bool]:
+        """Whether each of a folder's segments has alarms; what is known of others is forgotten."""
+        known = self._alarms.setdefault(str(folder), {})
+        for name in names:
+            if name not in known:
+                known[name] = _has_alarms(folder / name)
+            yield known[name]
+        if len(known) > len(names):
+            for name in known.keys() - {*names}:
+                del known[name]
+        if not known:
+            del self._alarms[str(folder)]
 
 
 def _has_alarms(path: Path) -> bool:
@@ -117,7 +167,7 @@ def _remove(path: Path) -> bool:
     """Remove a segment, and its folder with the last one; False if that is not possible."""
     try:
         path.unlink()
-        if not any(path.parent.glob(f"*{SUFFIX}")):
+        if not any(_names(path.parent)):
             for name in FILES:
                 (path.parent / name).unlink(missing_ok=True)
             path.parent.rmdir()
@@ -126,23 +176,41 @@ def _remove(path: Path) -> bool:
     return True
 
 
-def _segments_in(folder: str) -> Iterator[tuple[str, int, int]]:
-    """Name, time [ns] and size of a session's segments; not of those that are removed meanwhile."""
+def _list_segments(folder: Path, newest: Path | None, into: _Listing) -> None:
+    """Add name, time and size of a session's segments; not of those that are removed meanwhile."""
+    being_written = newest.name if newest is not None and newest.parent == folder else ""
     with contextlib.suppress(OSError), os.scandir(folder) as found:
         for entry in found:
-            if entry.name.endswith(SUFFIX):
+            if entry.name.endswith(SUFFIX) and entry.name != being_written:
                 with contextlib.suppress(OSError):
                     seen = entry.stat()
-                    yield sys.intern(entry.name), seen.st_mtime_ns, seen.st_size
+                    into.names.append(sys.intern(entry.name))
+                    into.ended.append(seen.st_mtime_ns)
+                    into.size.append(seen.st_size)
+
+
+def _date(ended: "array[int]", first: int, now_s: float) -> None:
+    """Date what a wrong clock has written like the newest other segment from the first one on."""
+    dated = [at for at in ended[first:] if at >= EARLIEST_NS]
+    otherwise = max(dated, default=round(now_s * 1e9))
+    if len(dated) < len(ended) - first:
+        for place in range(first, len(ended)):
+            if ended[place] < EARLIEST_NS:
+                ended[place] = otherwise
 
 
 def _newest(current: Path) -> Path | None:
     """The segment that is being written."""
-    return max(current.glob(f"*{SUFFIX}"), default=None)
+    name = max(_names(current), default="")
+    return current / name if name else None
 
 
-def _size_in(folder: Path, segments: list[Segment]) -> int:
-    return sum(one.size for one in segments if one.folder == str(folder))
+def _names(folder: Path) -> Iterator[str]:
+    """The names of a session's segments; a year has thousands: `Path.glob` lists them first."""
+    with contextlib.suppress(OSError), os.scandir(folder) as found:
+        for entry in found:
+            if entry.name.endswith(SUFFIX):
+                yield entry.name
 
 
 def _size(path: Path) -> int:

@@ -1,8 +1,11 @@
 """Decides which recordings are removed, by age and total size; those with alarms stay longer."""
 
 from collections.abc import Iterable
-from typing import Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
+import numpy as np
+
+from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
 from rigwatch.wire.rig_config import RecorderSection
 
 DAY = 86_400.0
@@ -25,6 +28,14 @@ class Recording(Protocol):
 R = TypeVar("R", bound=Recording)
 
 
+class Facts(NamedTuple):
+    """The same of several recordings, in arrays."""
+
+    ended: FloatArray
+    size: IntArray
+    alarms: BoolArray
+
+
 def expired(
     recordings: Iterable[R], rules: RecorderSection, now_s: float, kept: int = 0
 ) -> list[R]:
@@ -37,20 +48,25 @@ def expired(
         kept: size that counts and is not among them: of what is being written, and room for what
             comes before the next check [bytes].
     """
-    found = sorted(recordings, key=lambda one: (one.alarms, one.ended))
-    old = [one for one in found if _is_old(one, rules, now_s)]
-    excess = kept + sum(one.size for one in found) - sum(one.size for one in old)
-    limit = rules.keep_gigabytes * GIGABYTE
-    gone = set(map(id, old))
-    for one in found:
-        if not limit or excess <= limit:
-            break
-        if id(one) not in gone:
-            old.append(one)
-            excess -= one.size
-    return old
+    found = [*recordings]
+    facts = Facts(
+        np.array([one.ended for one in found], np.float64),
+        np.array([one.size for one in found], np.int64),
+        np.array([one.alarms for one in found], np.bool_),
+    )
+    return [found[place] for place in places_expired(facts, rules, now_s, kept)]
 
 
-def _is_old(one: Recording, rules: RecorderSection, now_s: float) -> bool:
-    days = rules.keep_alarm_days if one.alarms else rules.keep_days
-    return days > 0 and now_s - one.ended > days * DAY
+def places_expired(facts: Facts, rules: RecorderSection, now_s: float, kept: int = 0) -> list[int]:
+    """The same for recordings of which only what decides is known: their places."""
+    order = np.lexsort((facts.ended, facts.alarms))
+    ended, size, alarms = (one[order] for one in facts)
+    days = np.where(alarms, rules.keep_alarm_days, rules.keep_days)
+    old = (days > 0) & (now_s - ended > days * DAY)
+    excess = kept + int(size[~old].sum()) - rules.keep_gigabytes * GIGABYTE
+    gone: list[int] = order[old].tolist()
+    if rules.keep_gigabytes and excess > 0:
+        left = order[~old]
+        enough = np.searchsorted(np.cumsum(size[~old]), excess)
+        gone += left[: int(enough) + 1].tolist()
+    return gone
