@@ -270,7 +270,7 @@ class MonitorProcess:
     def _hears_nothing_new(self) -> bool:
         """Whether daq and recorder say nothing, or nothing that has to be told."""
         there = self._recorder is None or self._recorder_presence.has_token
-        if not len(self._of_daq) and not len(self._of_recorder):
+        if not self._of_daq.may_hold() and not self._of_recorder.may_hold():
             if there and not self._others_trouble:
                 return True
         else:

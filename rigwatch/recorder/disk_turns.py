@@ -18,8 +18,9 @@ from rigwatch.wire.host import Turns
 
 PART = 50
 """Rigs in a part of a turn, at least, if there are so many."""
-MOST_SYNCS = 64
-"""Files of a disk that are synced at the same time."""
+MOST_SYNCS = 16
+"""Files of a disk that are synced at the same time: to hand one to a thread costs as much as a
+small sync."""
 Together = Callable[[], AbstractContextManager[object]]
 
 
@@ -84,7 +85,13 @@ class DiskTurns:
 def _begin_all(syncs: Executor, turns: Sequence[Turn]) -> None:
     for turn in turns:
         turn.begin()
-    wait([syncs.submit(turn.sync) for turn in turns])
+    groups = min(len(turns), MOST_SYNCS)
+    wait([syncs.submit(_sync_all, turns[first::groups]) for first in range(groups)])
+
+
+def _sync_all(turns: Sequence[Turn]) -> None:
+    for turn in turns:
+        turn.sync()
 
 
 def _disk(folder: Path) -> int:

@@ -42,6 +42,10 @@ class Subscription:
         self._look_outside()
         return self._waiting.qsize()
 
+    def may_hold(self) -> bool:
+        """Whether something may wait: a look that costs less than the number, see `Waiting`."""
+        return self._waiting.qsize() > 0 or any(one.may_hold() for one in self._outside)
+
     def follow(self, outside: Waiting | None, end: Close) -> None:
         """Read what waits there as well, None if it is received as it comes; `end` closes it."""
         self._ends.append(end)

@@ -20,8 +20,9 @@ LONGEST_BLOCK, MOST_COLUMNS = 2048, 16
 """Size of a block [bytes] and number of its columns up to which it is read here."""
 MOST_SAMPLES = LONGEST_BLOCK // 16
 """A sample has two times at least."""
-MOST_FORMS = 8
-"""Forms of a rig that are kept: blocks have one or two lengths, and some more on a busy machine."""
+MOST_FORMS = 24
+"""Forms of a rig that are kept: blocks have a few lengths, and most of up to twenty samples on a
+busy machine, where to learn them again and again takes the time that it lacks."""
 _LENGTH, _SAMPLES, _SEQ, _SEQ_END, _DEVICE_US, _T_NS, _COLUMNS = range(7)
 
 
