@@ -297,7 +297,7 @@ class Narrator:
         address = self._workbench()
         where = f"the workbench ({address})" if address else "the workbench"
         self._say(f"            at the alarm in {where},")
-        self._say("            which makes its folder; then explain and add it, there or by commands:")
+        self._say("            which makes its folder; explain and add it there, or by commands:")
         self._say(f"              $ rigwatch explain {study}")
         self._say(f"              $ rigwatch add {study} {effect} --port {port}")
 

@@ -320,7 +320,7 @@ def test_what_is_missing_in_the_model_is_told_and_other_events_are_not() -> None
         "more about it: $ rigwatch effects coulomb",
         "next, how strong it is (the demo goes on meanwhile): Open as a study,",
         "at the alarm in the workbench,",
-        "which makes its folder; then explain and add it, there or by commands:",
+        "which makes its folder; explain and add it there, or by commands:",
         "$ rigwatch explain demo/studies/dry_friction-*",
         "$ rigwatch add demo/studies/dry_friction-* coulomb --port load",
     ]
