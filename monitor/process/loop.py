@@ -259,13 +259,32 @@ class MonitorProcess:
         return (
             not self._link_holds
             and silent_s <= self._stale_after
-            and not self._health.will_be_due(time.monotonic_ns())
             and self._hears_nothing_new()
             and not self._operators.has_some
             and not self._models.has_some
             and not self._explainer.has_results
             and not self.reader.has_some_alone
         )
+
+    @property
+    def health_is_due(self) -> bool:
+        """Whether a second has passed since the last health message."""
+        return self._health.will_be_due(time.monotonic_ns())
+
+    def tell_health(self) -> bool:
+        """Do what a look around does for a rig that is calm; whether a row may go on with it.
+
+        What the row has done has been told.
+        """
+        now_ns = self._now_ns()
+        seen = self._seen()
+        self.say(self.rig.alarms.pass_to(now_ns))
+        self._shelf = shelf_of(self.rig.alarms)
+        self._announce_clock_step(seen)
+        if self._health.is_due(seen.monotonic_ns):
+            self._tell_health(seen, waiting=0)
+        boot, last = self._last_judged() or (0, -1)
+        return self.rig.at_rest(boot, last + 1) is not None
 
     def _hears_nothing_new(self) -> bool:
         """Whether daq and recorder say nothing, or nothing that has to be told."""
@@ -304,7 +323,7 @@ class MonitorProcess:
         self._announce_router(seen)
         self._announce_clock_step(seen)
         if self._health.is_due(seen.monotonic_ns):
-            self._tell_health(seen)
+            self._tell_health(seen, len(self.reader))
         held = {name for name, _, holds in reports if holds}
         self._others_trouble = not held.isdisjoint(OF_OTHERS)
         self._link_holds = bool(held - OF_OTHERS) or self._router_lost_at is not None
@@ -488,7 +507,8 @@ class MonitorProcess:
             self.reader.position or (0, -1),
         )
 
-    def _tell_health(self, seen: Seen) -> None:
+    def _tell_health(self, seen: Seen, waiting: int) -> None:
+        """Publish the health, with the number of blocks that wait."""
         if self._alone and self._cursor:
             self._alone.check()
             self._cursor.keep()
@@ -501,7 +521,7 @@ class MonitorProcess:
             self._journal.write(())  # what waits is not on the disk before that
             text = self._journal.failure or text
         extra = {
-            "queue_length": float(len(self.reader)),
+            "queue_length": float(waiting),
             "rejected": float(self.reader.rejected),
             "dropped": float(self.reader.dropped),
             **self._operators.counters,

@@ -357,7 +357,8 @@ def _judge_rows(seats: Sequence[Seat], tables: Tables) -> set[int]:
     gone: set[int] = set()
     for table in tables:
         left = table.judge()
-        alone = {one.number for one in left}.union(table.restless(time.monotonic(), LOOK_EVERY))
+        alone = {one.number for one in left}
+        alone.update(table.restless(time.monotonic(), LOOK_EVERY, alone))
         for number in alone:
             seats[number].leave_table()
         for one in left:

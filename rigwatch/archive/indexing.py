@@ -19,11 +19,13 @@ from rigwatch.archive.retention.thinning import finish_thinning
 from rigwatch.archive.store import Store, Stored
 from rigwatch.archive.tables import pyarrow
 from rigwatch.batch import Job, Outcome, map_units
+from rigwatch.wire.typed_files import json_decoder
 
 BATCH = 500
 """Sessions between two writings of the catalogue."""
 Say = Callable[[str], None]
 Workers = Executor | Callable[[], Executor] | None
+_ENTRIES = json_decoder(Entry)
 
 
 @dataclass(slots=True)
@@ -127,7 +129,7 @@ def _stamp(entry: Entry) -> str:
 
 
 def _entry(text: str) -> Entry:
-    return msgspec.json.decode(text, type=Entry)
+    return _ENTRIES.decode(text)
 
 
 _JOB = Job("archive index", read_entry, content=_stamp, unit=_entry)

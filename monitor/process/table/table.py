@@ -1,7 +1,7 @@
 """The rigs of one receiver of joined samples, in arrays with a row for each."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -177,6 +177,10 @@ class Table:
         self._rows[number], self._there[number] = None, False
         self._moved.discard(number)
         self._steady.leave(number)
+        self._settle(number, row)
+
+    def _settle(self, number: int, row: Row) -> None:
+        """Tell a rig what its row has done since it was last told; all that it took is judged."""
         read, judged = int(self._read[number]), int(self._judged[number])
         self._read[number] = self._judged[number] = 0
         if read:
@@ -338,15 +342,18 @@ class Table:
                 positions.append((row.process.cursor, row.boot, int(self._end[number]) - 1))
         Cursor.write_all(positions)
 
-    def restless(self, now: float, look_every: float) -> list[int]:
+    def restless(self, now: float, look_every: float, left: Collection[int] = ()) -> list[int]:
         """The rigs that have to leave: something has closed their rows, or is to be looked at.
 
         Args:
             now: monotonic time [s].
             look_every: time from one look at a rig to the next [s].
+            left: rigs that leave in any case, of which not all that was taken is judged.
         """
-        found: list[int] = np.flatnonzero(self._there & ~self._reading.state.open).tolist()
-        due = np.flatnonzero(self._there & self._reading.state.open & (self._look_at <= now))
+        there = self._there.copy()
+        there[[*left]] = False
+        found: list[int] = np.flatnonzero(there & ~self._reading.state.open).tolist()
+        due = np.flatnonzero(there & self._reading.state.open & (self._look_at <= now))
         if due.size:
             # All in the same turns: what a look needs is then at hand.
             self._look_at[due] = look_every * (now // look_every + 1)
@@ -354,7 +361,7 @@ class Table:
             silent = (now - self._heard_at[due]).tolist()
             for number, silent_s in zip(due.tolist(), silent, strict=True):
                 row = self._rows[number]
-                if row is not None and not (connected and self._is_calm(number, row, silent_s)):
+                if row is not None and not (connected and self._goes_on(number, row, silent_s)):
                     self._look_at[number] = now
                     found.append(number)
         return found
@@ -363,9 +370,15 @@ class Table:
         """Monotonic time of the next look at a rig [s]."""
         return float(self._look_at[number])
 
-    def _is_calm(self, number: int, row: Row, silent_s: float) -> bool:
+    def _goes_on(self, number: int, row: Row, silent_s: float) -> bool:
+        """Whether a rig that is looked at may stay; its health is told from here."""
         try:
-            return row.process.is_calm(silent_s)
+            if not row.process.is_calm(silent_s):
+                return False
+            if not row.process.health_is_due:
+                return True
+            self._settle(number, row)
+            return row.process.tell_health()
         except Exception as error:  # of one rig: the others go on
             self._failures.append((number, error))
             return True

@@ -40,6 +40,7 @@ from rigwatch.browser.work import apart
 from rigwatch.wire.errors import ImportDataError, RigwatchError
 from rigwatch.wire.exchange import ImportMapping, import_file
 from rigwatch.wire.session import SUFFIX
+from rigwatch.wire.typed_files import as_kind
 
 MOST_PREVIEW = 64 << 20
 """Largest file of which a preview is made [bytes]: an import reads any, in the same time, once."""
@@ -163,7 +164,7 @@ def _uploaded(context: Context, wanted: dict[str, Any]) -> Path:
 
 def _mapping(given: object) -> ImportMapping:
     try:
-        return msgspec.convert(given, ImportMapping)
+        return as_kind(given, ImportMapping)
     except msgspec.ValidationError as error:
         raise ImportDataError(f"mapping: {error}") from None
 

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
 from rigwatch.browser.work import Results, results_of
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.typed_files import as_kind
 from rigwatch.workbench.compare import Comparison
 from rigwatch.workbench.explain import Explanation, still_holds
 from rigwatch.workbench.study import Study, check_data, digest, lines, open_study, refusals
@@ -123,7 +122,7 @@ def state_of(folder: Path, name: str, step: int | None = None) -> State:
 
 def _stored(results: Results) -> Explanation | None:
     told = results.read("explanation")
-    return None if told is None else msgspec.convert(told, Explanation, strict=False)
+    return None if told is None else as_kind(told, Explanation, strict=False)
 
 
 def _explanation(study: Study, results: Results) -> Explanation | None:
@@ -146,4 +145,4 @@ def _changed(study: Study) -> str:
 
 def _comparison(results: Results) -> Comparison | None:
     told = results.read("comparison")
-    return None if told is None else msgspec.convert(told, Comparison, strict=False)
+    return None if told is None else as_kind(told, Comparison, strict=False)

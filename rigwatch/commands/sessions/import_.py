@@ -106,9 +106,10 @@ def imported(
     import msgspec
 
     from rigwatch.wire.exchange import ImportMapping
+    from rigwatch.wire.typed_files import as_kind
 
     target = _target(Path(folder), source)
-    made = _imported(source, target, msgspec.convert(mapping, ImportMapping), start)
+    made = _imported(source, target, as_kind(mapping, ImportMapping), start)
     found: dict[str, Any] = msgspec.to_builtins(made, enc_hook=str)
     return found
 

@@ -14,6 +14,7 @@ from typing import Any
 import msgspec
 
 from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.typed_files.prepared import as_kind
 from rigwatch.wire.units import UnitError
 
 _PLACE = re.compile(r" - at `(?:key in )?\$(?P<path>[^`]*)`$")
@@ -122,7 +123,7 @@ def _refused(mapping: dict[str, Any], schema: Any) -> str:
     target = getattr(schema, "cls", None) or object
     for key, value in mapping.items():
         try:
-            msgspec.convert(value, target)
+            as_kind(value, target)
         except msgspec.ValidationError:
             return key
     return next(iter(mapping))

@@ -5,6 +5,8 @@ from typing import Any, TypeVar
 
 import msgspec
 
+from rigwatch.wire.typed_files.prepared import json_decoder
+
 T = TypeVar("T")
 
 
@@ -18,7 +20,7 @@ def json_value(data: bytes | str, kind: type[T]) -> T:
     Raises:
         JsonError: it is not JSON, not UTF-8, nested too deeply or not of this type.
     """
-    return decoded(data, msgspec.json.Decoder(kind))
+    return decoded(data, json_decoder(kind))
 
 
 def decoded(data: bytes | str, decoder: "msgspec.json.Decoder[T]") -> T:

@@ -15,6 +15,7 @@ import msgspec
 from rigwatch.wire.errors import ConfigError, reason_of
 from rigwatch.wire.typed_files.bounded import loads
 from rigwatch.wire.typed_files.explanation import explained
+from rigwatch.wire.typed_files.prepared import as_kind
 
 S = TypeVar("S", bound="Section")
 LINES = "`key = value` or `[section]`"
@@ -58,7 +59,7 @@ def converted(raw: dict[str, Any], kind: type[S], file: Path | str, text: str = 
         ConfigError: they are not a valid `kind`.
     """
     try:
-        return msgspec.convert(raw, kind)
+        return as_kind(raw, kind)
     except msgspec.ValidationError as error:
         raise explained(error, raw, kind, text, file) from None
 

@@ -19,6 +19,7 @@ import msgspec
 from rigwatch.wire.errors import ConfigError, reason_of
 from rigwatch.wire.typed_files.explanation import explained, line_of
 from rigwatch.wire.typed_files.loading import S, read_text, tables
+from rigwatch.wire.typed_files.prepared import as_kind
 from rigwatch.wire.typed_files.writing import as_toml
 
 BASE, NAME = "base", "name"
@@ -50,7 +51,7 @@ def load_layered(path: Path | str, kind: type[S], tag: str = "") -> S:
     layers = read_layers(path)
     raw = merged(layers, tag)
     try:
-        return msgspec.convert(raw, kind)
+        return as_kind(raw, kind)
     except msgspec.ValidationError as error:
         raise _placed(explained(error, raw, kind, layers[0].text, path), layers, raw) from None
 

@@ -12,7 +12,7 @@ from monitor.alarms.kinds import REPORTED
 from monitor.model.model_file import RigModel, model_text
 from monitor.process.cursor import stored_position
 from monitor.process.several import Seat, one_turn
-from monitor.process.table import Tables
+from monitor.process.table import Table, Tables
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.delivery import SampleRing
 from rigwatch.wire.messages import (
@@ -269,6 +269,35 @@ def test_rigs_stay_in_their_table_while_nothing_is_recorded(sides) -> None:
         found = [one.state for one in table.said[number] if one.name == "recording_stopped"]
         assert found == ["unacknowledged", "cleared_unacknowledged"]
         assert sorted(table.values(number)) == [(1, seq) for seq in range(_end(rigs[number]) + 1)]
+    assert not table.remarks
+
+
+def test_rigs_tell_their_health_from_the_table(sides, monkeypatch) -> None:
+    monkeypatch.setattr("monitor.process.health.INTERVAL_NS", 20_000_000)
+    _, table = sides
+    leaves: list[int] = []
+    leave = Table.leave
+    monkeypatch.setattr(Table, "leave", lambda of, k: leaves.append(k) or leave(of, k))
+    ears = [table.network.bus(f"r{number}", "ear").subscribe(HEALTH) for number in range(4)]
+    rigs = [[*sent(undisturbed(), seed, 0.0, 10**9)][:300] for seed in range(4)]
+    for number, blocks in enumerate(zip(*rigs, strict=True)):
+        if number == 100:
+            leaves.clear()
+            for ear in ears:
+                ear.drain()
+        table.send([*blocks])
+        table.turn()
+    told = [ear.drain() for ear in ears]
+    assert min(map(len, told)) > 5
+    assert len(leaves) < 0.3 * sum(map(len, told))
+    for seat, healths in zip(table.seats, told, strict=True):
+        counts = [one.counters["samples"] for one in healths]
+        assert counts == sorted(counts)
+        assert counts[-1] > counts[0] > 100 * min(SIZES)
+        assert {one.state for one in healths} == {"running"}
+        assert all(one.counters["latency_ms"] < 1e6 for one in healths)
+        seat.leave_table()
+        assert counts[-1] <= seat.delivered
     assert not table.remarks
 
 
