@@ -284,7 +284,12 @@ class MonitorProcess:
         if self._health.is_due(seen.monotonic_ns):
             self._tell_health(seen, waiting=0)
         boot, last = self._last_judged() or (0, -1)
-        return self.rig.at_rest(boot, last + 1) is not None
+        at_rest = self.rig.at_rest(boot, last + 1) is not None
+        return at_rest and not self._changes(self._reports(seen))
+
+    def _changes(self, reports: Iterable[Report]) -> bool:
+        """Whether an alarm has to be raised, or has gone."""
+        return any(self.rig.alarms.holds(name) != holds for name, _, holds in reports)
 
     def _hears_nothing_new(self) -> bool:
         """Whether daq and recorder say nothing, or nothing that has to be told."""
@@ -296,10 +301,7 @@ class MonitorProcess:
             self._hear_of_others()
         if self._daq_trouble or self._two_devices:
             return False
-        return not any(
-            self.rig.alarms.holds(name) != holds
-            for name, _, holds in self._reports_of_others(why=False)
-        )
+        return not self._changes(self._reports_of_others(why=False))
 
     def look_around(self) -> None:
         """Execute commands, check the link, publish the health."""
