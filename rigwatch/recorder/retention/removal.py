@@ -136,9 +136,9 @@ class Retention:
         found = _Listing()
         for path in sessions_of(Path(self._settings.folder), self._rig):
             first = len(found.names)
-            _list_segments(path, newest, found)
+            going_on_ns = _list_segments(path, newest, found)
             found.folders.append((str(path), first, len(found.names)))
-            _date(found.ended, first, now_s)
+            _date(found.ended, first, going_on_ns, round(now_s * 1e9))
             found.alarms += bytes(self._have_alarms(path, found.names[first:]))
         for gone in self._alarms.keys() - {folder for folder, *_ in found.folders}:
             del self._alarms[gone]  # others remove segments too
@@ -176,27 +176,42 @@ def _remove(path: Path) -> bool:
     return True
 
 
-def _list_segments(folder: Path, newest: Path | None, into: _Listing) -> None:
-    """Add name, time and size of a session's segments; not of those that are removed meanwhile."""
+def _list_segments(folder: Path, newest: Path | None, into: _Listing) -> int:
+    """Add name, time and size of a session's segments; not of those that are removed meanwhile.
+
+    Returns:
+        Time of the newest, which is being written and not added [ns]; 0 if it is elsewhere.
+    """
     being_written = newest.name if newest is not None and newest.parent == folder else ""
+    its_time = 0
     with contextlib.suppress(OSError), os.scandir(folder) as found:
         for entry in found:
-            if entry.name.endswith(SUFFIX) and entry.name != being_written:
-                with contextlib.suppress(OSError):
-                    seen = entry.stat()
-                    into.names.append(sys.intern(entry.name))
-                    into.ended.append(seen.st_mtime_ns)
-                    into.size.append(seen.st_size)
+            if not entry.name.endswith(SUFFIX):
+                continue
+            with contextlib.suppress(OSError):
+                seen = entry.stat()
+                if entry.name == being_written:
+                    its_time = seen.st_mtime_ns
+                    continue
+                into.names.append(sys.intern(entry.name))
+                into.ended.append(seen.st_mtime_ns)
+                into.size.append(seen.st_size)
+    return its_time
 
 
-def _date(ended: "array[int]", first: int, now_s: float) -> None:
-    """Date what a wrong clock has written like the newest other segment from the first one on."""
-    dated = [at for at in ended[first:] if at >= EARLIEST_NS]
-    otherwise = max(dated, default=round(now_s * 1e9))
-    if len(dated) < len(ended) - first:
-        for place in range(first, len(ended)):
-            if ended[place] < EARLIEST_NS:
-                ended[place] = otherwise
+def _date(ended: "array[int]", first: int, newest_ns: int, now_ns: int) -> None:
+    """Date what a wrong clock has written, from the first one on, like the newest of the session.
+
+    Args:
+        ended: ends of the segments [ns], changed.
+        first: place of the session's first one.
+        newest_ns: time of the one that is being written [ns].
+        now_ns: time of those of a session in which all clocks were wrong [ns].
+    """
+    wrong = [at for at in range(first, len(ended)) if ended[at] < EARLIEST_NS]
+    newest = max([newest_ns, *ended[first:]]) if wrong else 0
+    for place in wrong:
+        ended[place] = newest if newest >= EARLIEST_NS else now_ns
 
 
 def _newest(current: Path) -> Path | None:
