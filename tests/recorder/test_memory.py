@@ -184,6 +184,27 @@ def test_what_is_needed_for_a_moment_finds_room_that_is_there() -> None:
     assert grown_kb < needed_kb / 4
 
 
+NAMES_OF_A_YEAR = """
+import os, sys
+import rigwatch.recorder.process
+from rigwatch.wire.host import settle_memory, use_few_pools
+from tools.memory_series import memory_kb
+
+use_few_pools()
+settle_memory()
+before = memory_kb(os.getpid())
+for number in range(30_000):
+    sys.intern(f"{number:06d}.mcap")
+print(round(memory_kb(os.getpid()) - before))
+"""
+
+
+@on_linux
+def test_names_of_files_that_are_gone_take_no_memory() -> None:
+    (grown_kb,) = numbers_from(NAMES_OF_A_YEAR)
+    assert grown_kb < 150
+
+
 FREED_BETWEEN_OTHERS = """
 import os, threading, time
 from rigwatch.wire.host import few_pools

@@ -16,6 +16,9 @@ takes another one, which fills over weeks and stays. Its room is taken at the st
 Numpy keeps up to seven freed arrays of each size below a kilobyte, 4 MB in all. Blocks of ever new
 lengths come for months, and the flags of each leave one: all are made at the start.
 
+It keeps a table of names, of which every new file's is one: the place of a name that is gone is not
+used again until the table is full, and it then grows, once, by half a megabyte to one.
+
 Pieces that are freed between others stay with the process as well: the library gives back only what
 is free at the end of a pool, unless it is asked for all pages that hold nothing.
 """
@@ -23,6 +26,7 @@ is free at the end of a pool, unless it is asked for all pages that hold nothing
 import contextlib
 import ctypes
 import gc
+import sys
 import threading
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8
@@ -38,6 +42,8 @@ ARRAYS, OF_EACH = range(1, 1024), 7
 """Sizes of arrays that numpy keeps [bytes]; number of each."""
 _kept: list[bytes] = []
 """One of them: an arena without any would be given back."""
+NAMES = 1 << 16
+"""Names that fill the table: more than it has places."""
 TIDY_EVERY = 60.0
 """Time between two collections of everything [s]; with few new objects one takes under 1 ms."""
 _NO_GLIBC = (AttributeError, OSError, TypeError)
@@ -66,6 +72,7 @@ def settle_memory() -> None:
     if not _kept:
         _kept.append([bytes(SMALL) for _ in range(ROOM // SMALL)][-1])
         _fill_cache_of_arrays()
+        _fill_table_of_names()
     gc.freeze()
 
 
@@ -75,6 +82,11 @@ def _fill_cache_of_arrays() -> None:
 
     for size in ARRAYS:
         _made = [np.ones(size, np.uint8) for _ in range(OF_EACH)]
+
+
+def _fill_table_of_names() -> None:
+    for number in range(NAMES):
+        sys.intern(f"name {number}")
 
 
 def keep_memory_tidy(stop: threading.Event) -> None:
