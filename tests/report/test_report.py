@@ -177,6 +177,19 @@ def test_what_to_do_next_is_told_where_the_recordings_do_not_decide(study: Study
     assert next_step(replace(found, verdict="nothing_missing"), "rub") == ""
 
 
+def test_where_no_known_effect_explains_the_error_it_is_told_where_to_look(study: Study) -> None:
+    found = replace(gather(study).explanation, verdict="unknown_effect", beside=[], exchange=None)
+    best = replace(found.ranking[0], effect="coulomb", port="load", accepted=True)
+    look = "rigwatch locate rub shows where the model fails; an effect of your own is tried with"
+    look += " rigwatch add rub --effect-file FILE"
+    part = "; or, if you know that coulomb@load is a part of it: rigwatch add rub coulomb"
+    assert next_step(replace(found, ranking=[best]), "rub") == f"{look}{part} --port load"
+    assert next_step(replace(found, ranking=[replace(best, accepted=False)]), "rub") == look
+    assert next_step(replace(found, ranking=[]), "rub") == look
+    offered = Exchange("bouc_wen", "load", "dahl", 0.1, 0.01)
+    assert not next_step(replace(found, ranking=[best], exchange=offered), "rub")
+
+
 def test_the_commands_of_the_first_rivals_are_told_beside_that_of_the_simplest(
     study: Study,
 ) -> None:

@@ -209,6 +209,8 @@ def next_step(found: Explanation, study: str) -> str:
         found: the explanation.
         study: the study's folder, as on the command line.
     """
+    if found.verdict == "unknown_effect":
+        return _where_to_look(found, study)
     if found.verdict != "undetermined" or not found.ranking:
         return next_command(found, study)
     best = found.ranking[0]
@@ -221,6 +223,26 @@ def next_step(found: Explanation, study: str) -> str:
     return (
         f"{what}, list it under [[{use}]] in {study}/{FILE}, and explain again; or, if you know"
         f" that it is {'; if it is '.join(ways)}"
+    )
+
+
+def _where_to_look(found: Explanation, study: str) -> str:
+    """What to do where no known effect explains the error; empty if the text offers an exchange.
+
+    The best effect may be one of several that are missing, which the recordings cannot confirm.
+    """
+    if found.exchange is not None:
+        return ""
+    best = found.ranking[0] if found.ranking else None
+    look = (
+        f"rigwatch locate {study} shows where the model fails; an effect of your own is tried with"
+        f" rigwatch add {study} --effect-file FILE"
+    )
+    if best is None or not best.accepted:
+        return look
+    return (
+        f"{look}; or, if you know that {best.effect}@{best.port} is a part of it:"
+        f" {_adding(found, best, study)}"
     )
 
 
