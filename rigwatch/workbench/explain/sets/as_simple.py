@@ -45,10 +45,10 @@ def by_set_as_simple(
     sets, fitted = _as_simple(verdict, every), named.fitted
     better = _least(each for each in sets if _betters(each.fitted, fitted))
     if better is None:
-        less = [each for each in sets if leaves_less_of_all(each.fitted, fitted)]
-        if not less or not others_may_favour(bench.base, named, bench.floor):
+        less = _least(each for each in sets if leaves_less_of_all(each.fitted, fitted))
+        if less is None or not others_may_favour(bench.base, named, bench.floor):
             return None
-        return _undetermined(verdict, named, _least(less))
+        return _undetermined(verdict, named, less)
     plain = judge(bench.base, [row for row in rows if row is not named], bench.floor)
     if plain.word == "missing_effect" and _is_plainer(plain.best, named, better):
         text = f"{plain.text}; {named.label} leaves {fitted.told_error:.3g}, but {_leaves(better)}"
@@ -89,7 +89,7 @@ def _leaves(each: Combination) -> str:
 def _as_simple(verdict: Verdict, every: Sequence[Combination]) -> list[Combination]:
     """The sets of other effects than the named one that have no more parameters.
 
-    None if a set with the named effect leaves far less: that then only needs company.
+    Empty if a set with the named effect leaves far less: that then only needs company.
     """
     named, known = verdict.best, {*verdict.members, *verdict.rivals}
     assert named is not None
