@@ -13,6 +13,7 @@ from rigwatch.commands import main
 from rigwatch.page.scale import Scale, limits
 from rigwatch.page.svg import Plot
 from rigwatch.workbench.compare import Region
+from rigwatch.workbench.explain.exchange import Exchange
 from rigwatch.workbench.explain.verdict_calibration import LATER_COUNTS, later_probability_wrong
 from rigwatch.workbench.fit import Value
 from rigwatch.workbench.report import explanation_lines, next_command, next_step
@@ -174,6 +175,45 @@ def test_what_to_do_next_is_told_where_the_recordings_do_not_decide(study: Study
     named = replace(found, verdict="missing_effect", ranking=[best])
     assert next_step(named, "rub") == next_command(named, "rub")
     assert next_step(replace(found, verdict="nothing_missing"), "rub") == ""
+
+
+def test_where_no_known_effect_explains_the_error_it_is_told_where_to_look(study: Study) -> None:
+    found = replace(gather(study).explanation, verdict="unknown_effect", beside=[], exchange=None)
+    best = replace(found.ranking[0], effect="coulomb", port="load", accepted=True)
+    look = "rigwatch locate rub shows where the model fails; an effect of your own is tried with"
+    look += " rigwatch add rub --effect-file FILE"
+    part = "; or, if you know that coulomb@load is a part of it: rigwatch add rub coulomb"
+    assert next_step(replace(found, ranking=[best]), "rub") == f"{look}{part} --port load"
+    assert next_step(replace(found, ranking=[replace(best, accepted=False)]), "rub") == look
+    assert next_step(replace(found, ranking=[]), "rub") == look
+    offered = Exchange("bouc_wen", "load", "dahl", 0.1, 0.01)
+    assert not next_step(replace(found, ranking=[best], exchange=offered), "rub")
+
+
+def test_the_commands_of_the_first_rivals_are_told_beside_that_of_the_simplest(
+    study: Study,
+) -> None:
+    found = replace(gather(study).explanation, verdict="undetermined", next_experiment=None)
+    rows = [
+        replace(found.ranking[0], effect=name, port="load", accepted=name != "cubic_stiffness")
+        for name in ("jenkins", "cubic_stiffness", "bouc_wen", "elastoplastic", "lugre")
+    ]
+    rivals = [f"{row.effect}@load" for row in rows[1:]]
+    pair = replace(found, ranking=rows, rivals=rivals[1:2])
+    assert next_step(pair, "rub").endswith(
+        "it is jenkins@load: rigwatch add rub jenkins --port load;"
+        " if it is bouc_wen@load: rigwatch add rub bouc_wen --port load"
+    )
+    # A rival that is refused alone, and one after the second, are in the verdict's sentence only.
+    told = next_step(replace(pair, rivals=rivals), "rub")
+    assert told.endswith("if it is elastoplastic@load: rigwatch add rub elastoplastic --port load")
+    assert "add rub cubic_stiffness" not in told
+    beside = next_step(replace(pair, beside=["lag@drive", "lugre@load"], rivals=rivals[3:]), "rub")
+    assert beside.endswith(
+        "it is jenkins@load: rigwatch add rub jenkins --port load --with lag@drive lugre@load"
+    )
+    offered = Exchange("bouc_wen", "load", "dahl", 0.1, 0.01)
+    assert "add rub bouc_wen" not in next_step(replace(pair, exchange=offered), "rub")
 
 
 def test_that_more_is_missing_than_the_effect_named_is_in_the_headline(study: Study) -> None:

@@ -57,10 +57,7 @@ def explaining_all(
     effect, are no such rivals.
     """
     assert best.fitted is not None
-    much_in_training = shows_little_of_it(base, best, floor)
-    if floor.reached(best.fitted.held_out) or (
-        explains(base, best, floor) and not much_in_training
-    ):
+    if not others_may_favour(base, best, floor):
         return ()
     return tuple(
         row.label
@@ -74,6 +71,14 @@ def explaining_all(
         and not same_family(best, row)
         and leaves_less_of_all(row.fitted, best.fitted)
     )
+
+
+def others_may_favour(base: Fitted, best: Ranked, floor: NoiseFloor) -> bool:
+    """Whether an effect leaves so much, held out or in training, that the rest may favour it."""
+    assert best.fitted is not None
+    if floor.reached(best.fitted.held_out):
+        return False
+    return not explains(base, best, floor) or shows_little_of_it(base, best, floor)
 
 
 def favoured_by_training(

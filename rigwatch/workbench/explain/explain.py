@@ -81,11 +81,15 @@ class Explained:
         bench: the study with the base that it was judged on.
         rows: the ranking.
         explanation: what is told of it.
+        sought: whether what fits better in place of the last accepted effect was sought.
+        offer: that effect; None if there is none.
     """
 
     bench: Bench
     rows: list[Ranked]
     explanation: Explanation
+    sought: bool = False
+    offer: Exchange | None = None
 
 
 def explain(study: Study, progress: Progress = no_progress) -> Explanation:
@@ -178,7 +182,7 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
     replaces = _trains_better if by_training else _may_replace
     if not any(row.effect in rarer and replaces(first, row) for row in rows):
         return _unless_named(first, none)
-    second = _explained_once(replace(bench, study=wider), progress, rows)
+    second = _explained_once(replace(bench, study=wider), progress, rows, first)
     found = second.explanation
     if found.verdict not in STRENGTH_TOLD or not _is_better(first, second):
         return _unless_named(first, none)
@@ -256,18 +260,31 @@ def with_whole_library(study: Study) -> Study:
 
 
 def _explained_once(
-    bench: Bench, progress: Progress, ranked: list[Ranked] | None = None
+    bench: Bench,
+    progress: Progress,
+    ranked: list[Ranked] | None = None,
+    first: Explained | None = None,
 ) -> Explained:
-    """The explanation by the effects that the study ranks; `ranked` if they have been."""
+    """The explanation by the effects that the study ranks.
+
+    Args:
+        bench, progress: as for `explained`.
+        ranked: the ranking, if there is one.
+        first: an explanation by fewer effects. What may stand in place of the last accepted effect
+            was sought in the whole library there, and is not sought again.
+    """
     bench, rows, verdict = _ranked(bench, progress, ranked)
     bench = with_lower_floor(bench, rows)
     healthy = bench.data.healthy is not None
     if verdict.word in STRENGTH_TOLD and bench.data.along_motion and healthy:
         progress("finding what the healthy recording leaves open of the strength")
     found = explanation(bench, rows, verdict)
-    if bench.study.file.effects and _asks_for_exchange(bench, verdict):
-        found = _with_exchange(bench, found, verdict, progress)
-    return Explained(bench, rows, found)
+    if not (bench.study.file.effects and _asks_for_exchange(bench, verdict)):
+        return Explained(bench, rows, found)
+    offer = first.offer if first is not None and first.sought else exchange(bench, progress)
+    return Explained(
+        bench, rows, _with_exchange(bench, found, verdict, offer), sought=True, offer=offer
+    )
 
 
 def _asks_for_exchange(bench: Bench, verdict: Verdict) -> bool:
@@ -283,13 +300,12 @@ def _asks_for_exchange(bench: Bench, verdict: Verdict) -> bool:
 
 
 def _with_exchange(
-    bench: Bench, found: Explanation, verdict: Verdict, progress: Progress
+    bench: Bench, found: Explanation, verdict: Verdict, offer: Exchange | None
 ) -> Explanation:
     """The explanation with the effect that fits better than the last accepted one, if any does.
 
     If an effect is named that leaves more beside the accepted one, it is undetermined.
     """
-    offer = exchange(bench, progress)
     named = verdict.best if verdict.word == "missing_effect" else None
     if offer is None or (named is not None and not _speaks_against(offer, named)):
         return found

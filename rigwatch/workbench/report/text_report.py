@@ -22,6 +22,8 @@ BEYOND = (
 """What it means that a parameter is on a bound."""
 MOST_ROWS = 12
 """Rows of a printed ranking; `--json` has all."""
+MOST_RIVALS = 2
+"""Rivals whose commands are printed; the verdict's sentence has all."""
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
@@ -191,14 +193,13 @@ def next_command(found: Explanation, study: str) -> str:
     """
     if found.verdict != "missing_effect" or not found.ranking:
         return ""
-    return _adding(found, study)
+    return _adding(found, found.ranking[0], study)
 
 
-def _adding(found: Explanation, study: str) -> str:
-    """The command that adds the best effect, beside those without which it is refused."""
-    best = found.ranking[0]
+def _adding(found: Explanation, row: Row, study: str) -> str:
+    """The command that adds an effect, beside those without which it is refused."""
     others = f" --with {' '.join(found.beside)}" if found.beside else ""
-    return f"rigwatch add {study} {best.effect} --port {best.port}{others}"
+    return f"rigwatch add {study} {row.effect} --port {row.port}{others}"
 
 
 def next_step(found: Explanation, study: str) -> str:
@@ -208,15 +209,56 @@ def next_step(found: Explanation, study: str) -> str:
         found: the explanation.
         study: the study's folder, as on the command line.
     """
+    if found.verdict == "unknown_effect":
+        return _where_to_look(found, study)
     if found.verdict != "undetermined" or not found.ranking:
         return next_command(found, study)
     best = found.ranking[0]
     what = "record that experiment" if found.next_experiment else "record another motion"
     use, anyway = ("train", "") if best.accepted or found.beside else ("held_out", " --anyway")
+    ways = [
+        f"{row.effect}@{row.port}: {_adding(found, row, study)}{anyway}"
+        for row in (best, *_rivals_to_add(found))
+    ]
     return (
         f"{what}, list it under [[{use}]] in {study}/{FILE}, and explain again; or, if you know"
-        f" that it is {best.effect}@{best.port}: {_adding(found, study)}{anyway}"
+        f" that it is {'; if it is '.join(ways)}"
     )
+
+
+def _where_to_look(found: Explanation, study: str) -> str:
+    """What to do where no known effect explains the error; empty if the text offers an exchange.
+
+    The best effect may be one of several that are missing, which the recordings cannot confirm.
+    """
+    if found.exchange is not None:
+        return ""
+    best = found.ranking[0] if found.ranking else None
+    look = (
+        f"rigwatch locate {study} shows where the model fails; an effect of your own is tried with"
+        f" rigwatch add {study} --effect-file FILE"
+    )
+    if best is None or not best.accepted:
+        return look
+    return (
+        f"{look}; or, if you know that {best.effect}@{best.port} is a part of it:"
+        f" {_adding(found, best, study)}"
+    )
+
+
+def _rivals_to_add(found: Explanation) -> list[Row]:
+    """The first rivals that `add` takes in the same way as the best effect.
+
+    A rival that is refused alone may belong to a set, and one that is offered in place of the last
+    accepted effect has its commands in the text.
+    """
+    best, offer = found.ranking[0], found.exchange
+    known = {f"{best.effect}@{best.port}", *found.beside}
+    known |= {f"{offer.effect}@{offer.port}"} if offer else set()
+    rows = {f"{row.effect}@{row.port}": row for row in found.ranking}
+    rivals = [rows[name] for name in found.rivals if name in rows and name not in known]
+    taken = [row for row in rivals if row.accepted == best.accepted or found.beside]
+    return taken[:MOST_RIVALS]
 
 
 def doubt_of(found: Explanation) -> str:

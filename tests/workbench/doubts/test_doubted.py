@@ -1,5 +1,6 @@
 """An effect that wins alone beside sets of others that leave far less; and what was refused."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,14 +12,14 @@ from rigwatch.workbench.compare import open_bench
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.explain.sets.as_simple import by_set_as_simple
 from rigwatch.workbench.explain.sets.combination import Combination
-from rigwatch.workbench.explain.sets.several_effects import _doubted
+from rigwatch.workbench.explain.sets.several_effects import _doubted, _with_best_set
 from rigwatch.workbench.explain.verdict import judge
 from rigwatch.workbench.ranking import Ranked
 from tests.workbench.dampers import stroke
 from tests.workbench.machine import studied
 from tests.workbench.simulated import knowing
 from tests.workbench.studies.test_recordings_apart import DAMPER, UNITS
-from tests.workbench.verdicts.test_judge import PERIODS, base, row
+from tests.workbench.verdicts.test_judge import PERIODS, QUIET, base, row
 
 
 def sets_with(pair_error: float, *pair: str) -> tuple[list[Ranked], list[Combination]]:
@@ -79,6 +80,31 @@ def test_of_one_physics_the_plain_law_is_named_if_a_set_with_it_is_as_simple_and
     assert (found.word, found.members[0]) == (word, named)
     told = "other@load, plain@load together, with no more parameters, leave 1.8 N" in found.text
     assert told == (found is not verdict)
+
+
+@pytest.mark.parametrize(
+    ("pair_errors", "own_error", "start", "word", "told"),
+    [
+        ((1.5, 2.1), 1.7, 5.0, "undetermined", "but other@load, plain@load together, with"),
+        ((2.2, 1.5), 1.7, 5.0, "undetermined", "but other@load, plain@load together, with"),
+        ((2.2, 2.1), 1.7, 5.0, "missing_effect", "leave 2.1 N, and what else is missing may"),
+        ((1.5, 3.2), 1.7, 5.0, "missing_effect", ""),  # far too much of what is held out
+        ((1.5, 2.1), 1.7, 20.0, "missing_effect", ""),  # it leaves next to nothing
+        ((1.5, 2.1), 1.3, 5.0, "missing_effect", ""),  # it only needs company
+    ],
+)
+def test_a_set_as_simple_that_leads_on_all_recordings_or_is_near_is_told_where_much_is_left(
+    pair_errors: tuple[float, float], own_error: float, start: float, word: str, told: str
+) -> None:
+    alone, every = bent(pair_errors[1], own_error)
+    pair = every[2].rows[-1]
+    pair.fitted = replace(pair.fitted, train=base(pair_errors[0]).train)
+    bench: Any = SimpleNamespace(base=base(start), floor=QUIET)
+    found = _with_best_set(bench, alone, judge(bench.base, alone, QUIET), every[2], every)
+    assert (found.word, found.members[0]) == (word, "bent@load")
+    assert told in found.text
+    assert ("no more parameters" in found.text) == bool(told)
+    assert {"other@load", "plain@load"} <= set(found.rivals) or word == "missing_effect"
 
 
 def test_dry_friction_and_drag_are_not_called_falling_friction_where_more_is_missing(

@@ -88,7 +88,8 @@ def test_rarer_effects_are_counted_apart_and_offered_where_none_explains_the_err
     out = capsys.readouterr().out
     assert "something is missing that no known effect explains" in out
     assert f"nor is it like one of {len(rarer)} rarer ones" in out
-    assert "next:" not in out
+    assert "--whole-library" not in out
+    assert f"next: rigwatch locate {folder} shows where the model fails" in out
     file = folder / "study.toml"
     own_value = f"set this machine's under [start] in {file}"
     assert f"note: thickness: taken from the model file; {own_value}" in out

@@ -1,5 +1,6 @@
 """The last accepted effect exchanged for a relative that describes the same physics better."""
 
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,11 @@ from rigwatch.workbench.explain import explain
 from rigwatch.workbench.explain.exchange import exchange, of_a_kind
 from rigwatch.workbench.ranking import no_progress
 from rigwatch.workbench.steps.change import add, undo
-from rigwatch.workbench.study import open_study
+from rigwatch.workbench.study import Accepted, open_study
 from tests.workbench.dampers import damper
+from tests.workbench.simulated import knowing
+
+explain_module = import_module("rigwatch.workbench.explain.explain")
 
 STIFFNESS, LIMIT, MORE, SLOW = 8e3, 20.0, 0.4, 0.015
 
@@ -57,6 +61,26 @@ def test_a_slider_that_turns_out_to_be_behind_play_is_offered_in_its_place(
     after = add(open_study(study.folder), found.effect, found.port).after
     assert after.held_out_error == pytest.approx(found.held_out_error, rel=0.05)
     assert after.held_out_error < before.comparison.held_out_error
+
+
+def test_what_stands_in_its_place_is_sought_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rarer effects are tried where the usual ones explain little; the exchange knows them all."""
+
+    def force(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+        rest = 6 * np.sin(x / 1e-3) * np.cos(v / 0.02)
+        return np.asarray(LIMIT * np.tanh(v / 1e-3) + 40 * np.tanh(v / 0.03) + rest)
+
+    made = knowing(damper(tmp_path, force), "coulomb", "digressive_damping", "gain")
+    study = made.with_effects([Accepted(effect="coulomb", port="load", parameters={"Fc": LIMIT})])
+    sought: list[str] = []
+    monkeypatch.setattr(explain_module, "exchange", lambda *_: sought.append("exchange"))
+    assert explain(study, sought.append).verdict == "unknown_effect"
+    assert [said for said in sought if said in ("exchange", "trying 2 effects at once")] == [
+        "exchange",
+        "trying 2 effects at once",
+    ]
 
 
 def held_harder_at_low_speed(x: np.ndarray, v: np.ndarray) -> np.ndarray:

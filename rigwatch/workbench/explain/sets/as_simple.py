@@ -1,14 +1,15 @@
-"""The verdict on an effect that a set with no more parameters betters on all recordings.
+"""The verdict on an effect beside a set of others that has no more parameters.
 
 A law with a shape of its own bends into the likeness of two plain ones: friction that falls with
 speed over all the motion there is, beside viscous friction, is dry friction and a drag that grows.
 Where no set leaves only noise the effect that leads alone is named, and the set would be lost.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from rigwatch.workbench.compare import Bench
+from rigwatch.workbench.explain.contradicting import leaves_less_of_all, others_may_favour
 from rigwatch.workbench.explain.sets.combination import Combination
 from rigwatch.workbench.explain.verdict import Verdict, judge
 from rigwatch.workbench.fit import Fitted
@@ -27,8 +28,10 @@ def by_set_as_simple(
 ) -> Verdict | None:
     """The verdict if a set without the named effect is as simple and leaves less; otherwise None.
 
-    If what leads without the named effect is the same physics at the same port and belongs to the
-    set, that is named. Otherwise nothing is named with confidence.
+    If a set leaves less by more than chance, and what leads without the named effect is the same
+    physics at the same port and belongs to the set, that is named. Otherwise nothing is named with
+    confidence. So it is if the effect leaves much, and a set leaves less of all recordings
+    together: which of the two leads where is then chance, as with single effects.
 
     Args:
         bench: the study.
@@ -36,42 +39,69 @@ def by_set_as_simple(
         verdict: names an effect with confidence.
         every: the sets that were fitted.
     """
-    named, best = verdict.best, _as_simple(verdict, every)
-    if named is None or named.fitted is None or best is None:
+    named = verdict.best
+    if named is None or named.fitted is None:
         return None
-    left = f"{', '.join(sorted(best.labels))} together, with no more parameters, leave"
-    left += f" {best.fitted.told_error:.3g} {best.fitted.told_in}"
+    sets, fitted = _as_simple(verdict, every), named.fitted
+    better = _least(each for each in sets if _betters(each.fitted, fitted))
+    if better is None:
+        less = _least(each for each in sets if leaves_less_of_all(each.fitted, fitted))
+        if less is None or not others_may_favour(bench.base, named, bench.floor):
+            return None
+        return _undetermined(verdict, named, less)
     plain = judge(bench.base, [row for row in rows if row is not named], bench.floor)
-    if plain.word == "missing_effect" and _is_plainer(plain.best, named, best):
-        text = f"{plain.text}; {named.label} leaves {named.fitted.told_error:.3g}, but {left}"
+    if plain.word == "missing_effect" and _is_plainer(plain.best, named, better):
+        text = f"{plain.text}; {named.label} leaves {fitted.told_error:.3g}, but {_leaves(better)}"
         return replace(plain, text=text)
-    rivals = tuple(sorted({*verdict.rivals, *best.labels}))
-    text = f"{named.label} lowers the held-out error most of single effects, but {left}"
+    return _undetermined(verdict, named, better)
+
+
+def with_set_told(bench: Bench, verdict: Verdict, every: Sequence[Combination]) -> Verdict:
+    """The verdict with a set as simple in its text, if that may be what is missing instead.
+
+    Args:
+        bench: the study.
+        verdict: names an effect with confidence.
+        every: the sets that were fitted.
+    """
+    named = verdict.best
+    if named is None or named.fitted is None:
+        return verdict
+    near = MUCH_WORSE * named.held_out_error
+    best = _least(s for s in _as_simple(verdict, every) if s.fitted.held_out_error < near)
+    if best is None or not others_may_favour(bench.base, named, bench.floor):
+        return verdict
+    favours = f"and what else is missing may favour {named.label}"
+    return replace(verdict, text=f"{verdict.text}; {_leaves(best)}, {favours}")
+
+
+def _undetermined(verdict: Verdict, named: Ranked, instead: Combination) -> Verdict:
+    rivals = tuple(sorted({*verdict.rivals, *instead.labels}))
+    text = f"{named.label} lowers the held-out error most of single effects, but {_leaves(instead)}"
     return replace(verdict, word="undetermined", rivals=rivals, text=text)
 
 
-def _as_simple(verdict: Verdict, every: Sequence[Combination]) -> Combination | None:
-    """The best set that betters the named effect with other effects and no more parameters.
+def _leaves(each: Combination) -> str:
+    together = f"{', '.join(sorted(each.labels))} together, with no more parameters, leave"
+    return f"{together} {each.fitted.told_error:.3g} {each.fitted.told_in}"
 
-    None if a set with the named effect leaves far less: then that only needs company.
+
+def _as_simple(verdict: Verdict, every: Sequence[Combination]) -> list[Combination]:
+    """The sets of other effects than the named one that have no more parameters.
+
+    Empty if a set with the named effect leaves far less: that then only needs company.
     """
     named, known = verdict.best, {*verdict.members, *verdict.rivals}
     assert named is not None
-    assert named.fitted is not None
     sets = [each for each in every if len(each.rows) > 1]
     own = [each.fitted.held_out_error for each in sets if each.labels & known]
-    return min(
-        (
-            each
-            for each in sets
-            if not each.labels & known
-            and each.free <= named.free
-            and each.fitted.held_out_error < MUCH_WORSE * min(own, default=float("inf"))
-            and _betters(each.fitted, named.fitted)
-        ),
-        key=lambda each: each.fitted.held_out_error,
-        default=None,
-    )
+    most = MUCH_WORSE * min(own, default=float("inf"))
+    others = [each for each in sets if not each.labels & known and each.free <= named.free]
+    return [each for each in others if each.fitted.held_out_error < most]
+
+
+def _least(sets: Iterable[Combination]) -> Combination | None:
+    return min(sets, key=lambda each: each.fitted.held_out_error, default=None)
 
 
 def _betters(one: Fitted, other: Fitted) -> bool:

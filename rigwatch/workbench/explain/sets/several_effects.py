@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.explain.remaining_error import shows_little_of_it
-from rigwatch.workbench.explain.sets.as_simple import by_set_as_simple
+from rigwatch.workbench.explain.sets.as_simple import by_set_as_simple, with_set_told
 from rigwatch.workbench.explain.sets.combination import (
     Combination,
     floor_of,
@@ -164,7 +164,8 @@ def _with_best_set(
 ) -> Verdict:
     """The verdict with what the best set leaves in its text, or in doubt of the named effect."""
     if verdict.word == "missing_effect":
-        return by_set_as_simple(bench, rows, verdict, every) or _doubted(verdict, every)
+        found = by_set_as_simple(bench, rows, verdict, every) or _doubted(verdict, every)
+        return with_set_told(bench, verdict, every) if found is verdict else found
     if verdict.word not in UNNAMED or len(best.rows) == 1:
         return verdict
     text = f"{verdict.text}; {_joined(best.labels)} together leave"
