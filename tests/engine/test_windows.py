@@ -8,11 +8,12 @@ from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import Model, shipped_models
 from rigwatch.physics.engine.equations.system import Placement, compose
 from rigwatch.physics.engine.fit.problem import Problem
-from rigwatch.physics.engine.fit.recording import Recording, initial_states
+from rigwatch.physics.engine.fit.recording import Recording, apart, initial_states
 from rigwatch.physics.engine.fit.windowed_fit import evaluate, fit
 from rigwatch.physics.engine.score.candidates import shaped
 from rigwatch.physics.engine.score.effect_sensitivities import directions
 from rigwatch.physics.engine.score.trajectory import trajectory
+from rigwatch.physics.transfer import Derivative
 from rigwatch.wire.typed_files.loading import parse
 
 DT, N, HORIZON, RATE, FAST = 1 / 256, 1024, 128, 60.0, 50.0
@@ -186,3 +187,41 @@ def test_a_gap_at_the_join_of_two_recordings_is_not_bridged():
     system = compose(parse(FOLLOWER, Model, "follower"))
     found = initial_states(system, Recording(DT, np.zeros((100, 1)), seen[:, None], parts=(50, 50)))
     assert found[:, 0].tolist() == [1.0] * 50 + [5.0] * 50
+
+
+DERIVED = (Derivative(40.0, 1, 256.0),)
+"""How the output of `three_parts` was derived."""
+
+
+def three_parts() -> Recording:
+    return Recording(
+        0.15,
+        np.arange(60.0).reshape(30, 2),
+        np.arange(30.0)[:, None],
+        parts=(10, 12, 8),
+        driving=1,
+        passed=0.2,
+        breaks=(4, 15, 22),
+        spacings=(0.1, 0.2, 0.1),
+        derived=DERIVED,
+    )
+
+
+def test_a_stretch_keeps_the_boundaries_that_it_spans() -> None:
+    cut = three_parts().stretch(4, 24)
+    assert cut.parts == (6, 12, 2)
+    assert cut.spacings == (0.1, 0.2, 0.1)
+    assert cut.dt == np.average([0.1, 0.2, 0.1], weights=[6, 12, 2])
+    assert cut.breaks == (0, 11, 18)
+    assert cut.outputs[:, 0].tolist() == [*range(4, 24)]
+    assert cut.inputs[:, 1].tolist() == [*range(9, 49, 2)]
+    assert (cut.driving, cut.passed, cut.derived) == (1, 0.2, DERIVED)
+
+
+def test_each_recording_apart_has_its_own_rate() -> None:
+    first, second, third = apart(three_parts())
+    assert [one.dt for one in (first, second, third)] == [0.1, 0.2, 0.1]
+    assert not any(one.spacings for one in (first, second, third))
+    assert [one.breaks for one in (first, second, third)] == [(4,), (5,), (0,)]
+    assert second.outputs[:, 0].tolist() == [*range(10, 22)]
+    assert second.passed == 0.2
