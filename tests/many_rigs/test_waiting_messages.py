@@ -56,7 +56,8 @@ def test_what_a_killed_source_sent_last_is_read_before_its_end(
     rig.publisher(6)
     eventually(lambda: reads(at_once, heard, 6, 5), "samples of the next")
     eventually(lambda: reads(later, found, 6, 5), "the same")
-    assert samples(found, 5)[-1] == samples(heard, 5)[-1]
+    # Each sample is sent twice, for processes of one rig first: a kill may come between the two.
+    assert samples(heard, 5)[-1] - samples(found, 5)[-1] in (0, 1)
     assert samples(found, 5) == list(range(samples(found, 5)[0], samples(found, 5)[-1] + 1))
     assert later.counters.foreign == 0
     other.close()
