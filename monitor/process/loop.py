@@ -294,11 +294,10 @@ class MonitorProcess:
     def _hears_nothing_new(self) -> bool:
         """Whether daq and recorder say nothing, or nothing that has to be told."""
         there = self._recorder is None or self._recorder_presence.has_token
-        if not self._of_daq.may_hold() and not self._of_recorder.may_hold():
-            if there and not self._others_trouble:
-                return True
-        else:
+        if self._of_daq.may_hold() or self._of_recorder.may_hold():
             self._hear_of_others()
+        elif there and not self._others_trouble:
+            return True
         if self._daq_trouble or self._two_devices:
             return False
         return not self._changes(self._reports_of_others(why=False))

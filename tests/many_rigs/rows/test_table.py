@@ -273,7 +273,8 @@ def test_rigs_stay_in_their_table_while_nothing_is_recorded(sides) -> None:
 
 
 def test_rigs_tell_their_health_from_the_table(sides, monkeypatch) -> None:
-    monkeypatch.setattr("monitor.process.health.INTERVAL_NS", 20_000_000)
+    # With each look: on a fast machine all the turns take some hundredths of a second.
+    monkeypatch.setattr("monitor.process.health.INTERVAL_NS", 1_000_000)
     _, table = sides
     leaves: list[int] = []
     leave = Table.leave

@@ -64,6 +64,19 @@ variables.v = {{ expression = "v", unit = "m/s" }}
 """
 
 
+def acceleration(force: float, x: float, v: float, friction: float) -> float:
+    """That of a mass on a spring, at rest while its dry friction holds it."""
+    push = force - 60.0 * x - 1.5 * v
+    holds = v == 0.0 and abs(push) <= friction
+    return 0.0 if holds else float(push - friction * np.sign(v or push)) / 0.8
+
+
+def speed_after(v: float, a: float, step: float) -> float:
+    """The speed a step later: friction stops what would turn around."""
+    after = v + a * step
+    return 0.0 if v * after < 0.0 else after
+
+
 def moved(friction: float, seed: int) -> tuple[Recording, np.ndarray]:
     """A mass on a spring behind friction that holds it, and whether it sticks at each sample."""
     time = np.arange(24 * round(RATE)) / RATE
@@ -72,11 +85,8 @@ def moved(friction: float, seed: int) -> tuple[Recording, np.ndarray]:
     for force in drive:
         a = 0.0
         for _ in range(STEPS):
-            push = force - 60.0 * x - 1.5 * v
-            holds = v == 0.0 and abs(push) <= friction
-            a = 0.0 if holds else (push - friction * np.sign(v or push)) / 0.8
-            after = v + a * step
-            v = 0.0 if v * after < 0.0 else after
+            a = acceleration(force, x, v, friction)
+            v = speed_after(v, a, step)
             x += v * step
         rows.append((force, x, a))
         stuck.append(v == 0.0)
@@ -111,16 +121,10 @@ def driven(friction: float, seed: int) -> Table:
     )
     x, v, mean, step, rows = 0.0, 0.0, 0.0, 1.0 / SAMPLED / FINE, []
     for now in force:
-        push = now - 60.0 * x - 1.5 * v
-        holds = v == 0.0 and abs(push) <= friction
-        a = 0.0 if holds else (push - friction * np.sign(v or push)) / 0.8
-        rows.append((x, a - mean))
+        rows.append((x, acceleration(now, x, v, friction) - mean))
         for _ in range(FINE):
-            push = now - 60.0 * x - 1.5 * v
-            holds = v == 0.0 and abs(push) <= friction
-            a = 0.0 if holds else (push - friction * np.sign(v or push)) / 0.8
-            after = v + a * step
-            v = 0.0 if v * after < 0.0 else after
+            a = acceleration(now, x, v, friction)
+            v = speed_after(v, a, step)
             x += v * step
             mean += CORNER * (a - mean) * step
     moving = slice(round(5 * SAMPLED), None)
