@@ -191,7 +191,7 @@ def _with_rates(
         remarks += at_own_rates(whole, names)
         return tables
     kept = frozenset(
-        study.file.channels.get(name, own.channel or name)
+        study.file.channel_of(name, own)
         for name, own in study.model.inputs.items()
         if study.model.held(name) == "zero"
     )
@@ -243,7 +243,7 @@ def _recording(
     passed = min(table.passed for table in tables)
     dt, spacings = of_parts([table.dt for table in tables], parts)
     derived = tuple(
-        tables[0].derived.get(_channel(study, name, output))
+        tables[0].derived.get(study.file.channel_of(name, output))
         for name, output in study.model.outputs.items()
     )
     made = Recording(
@@ -266,16 +266,11 @@ def _beyond(use: str, spans: Sequence[float], share: float, horizon: float) -> s
     )
 
 
-def _channel(study: Study, name: str, signal: Input | Output) -> str:
-    """Name of the channel of a signal of the model."""
-    return study.file.channels.get(name, signal.channel or name)
-
-
 def _matched(study: Study, table: Columns) -> tuple[FloatArray, FloatArray]:
     model = study.model
 
     def column(name: str, signal: Input | Output) -> FloatArray:
-        wanted = _channel(study, name, signal)
+        wanted = study.file.channel_of(name, signal)
         if wanted not in table.values:
             raise ModelError(
                 f"{model.name}: found no channel {wanted!r} for {name}"

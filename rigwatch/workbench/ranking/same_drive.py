@@ -115,8 +115,7 @@ def _sizes(study: Study, data: Data, recording: Recording, band: BoolArray) -> d
     for name, port in model.ports.items():
         if port.kind != "sensor" or port.signal not in outputs:
             continue
-        channel = model.outputs[port.signal].channel or port.signal
-        if file.channels.get(port.signal, channel) not in derived:
+        if file.channel_of(port.signal, model.outputs[port.signal]) not in derived:
             read[name] = bridged(recording.outputs[:, outputs.index(port.signal)])
     return {
         port: float(np.sqrt(np.sum(_spectra((x - x.mean())[:, None])[band] ** 2)))

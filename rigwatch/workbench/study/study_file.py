@@ -4,9 +4,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, field
 
-from rigwatch.physics.engine.equations import (
-    Hold,
-)
+from rigwatch.physics.engine.equations import Hold, Input, Output
 from rigwatch.wire.typed_files import Section
 
 Lateness = Annotated[float, Meta(ge=-1, le=1)]
@@ -162,3 +160,7 @@ class StudyFile(Section, frozen=True, kw_only=True):
         bool, Meta(description="also rank the elective effects of the library")
     ] = False
     effects: Annotated[tuple[Accepted, ...], Meta(description="accepted effects, in order")] = ()
+
+    def channel_of(self, name: str, signal: Input | Output) -> str:
+        """The channel that a signal of the model is read from or compared with."""
+        return self.channels.get(name, signal.channel or name)

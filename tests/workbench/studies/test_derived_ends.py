@@ -15,7 +15,7 @@ from rigwatch.workbench.compare.compare import compare
 from rigwatch.workbench.data import Columns
 from rigwatch.workbench.data.derived_ends import without_ends
 from rigwatch.workbench.data.recorded_columns import with_derived
-from rigwatch.workbench.study.study_file import Derive, Derived, Thin
+from rigwatch.workbench.study.study_file import Derive, Derived, Span, StudyFile, Thin
 from tests.workbench.machine import studied
 
 DT = 0.005
@@ -25,9 +25,11 @@ MEASURED = np.ones((2000, 1))
 def study(derived: str = "velocity", thin: Thin | None = None) -> Any:
     """A damper's study; its model has a displacement and a velocity as inputs."""
     derive = Derive(low_pass=20.0, signals={derived: Derived(channel="x", order=1)})
+    spans = (Span(session="log"),)
+    file = StudyFile(model="damper", train=spans, held_out=spans, derive=derive, thin=thin)
     inputs = {name: SimpleNamespace(channel="") for name in ("displacement", "velocity")}
-    file = SimpleNamespace(derive=derive, thin=thin, channels={})
-    return SimpleNamespace(file=file, model=SimpleNamespace(inputs=inputs))
+    outputs = {"force": SimpleNamespace(channel="")}
+    return SimpleNamespace(file=file, model=SimpleNamespace(inputs=inputs, outputs=outputs))
 
 
 def test_two_periods_of_the_low_pass_do_not_count_at_each_end() -> None:
@@ -73,9 +75,16 @@ ACCELERATION = (
 )
 
 
-def pushed(seed: int, mass: float = 0.5) -> dict[str, np.ndarray]:
-    """A position that begins and ends at rest, in closed form, and the force that causes it."""
-    since, turn, width = DT * (np.arange(4000) - 2000), 2 * np.pi * 0.8, 2.0
+LEFT_OF_NOISE = 2.8e-3
+"""What noise of 1 µm in the position leaves in its second derivative, by the low-pass [m/s²]."""
+
+
+def pushed(seed: int, mass: float = 0.5, width: float = 2.0) -> dict[str, np.ndarray]:
+    """A position in closed form, and the force that causes it.
+
+    After `width` s it has grown or faded by 60 %, so that 2 s of 20 begin and end at rest.
+    """
+    since, turn = DT * (np.arange(4000) - 2000), 2 * np.pi * 0.8
     wave, slope = np.sin(turn * since + seed), turn * np.cos(turn * since + seed)
     grown = np.exp(-(since**2) / (2 * width**2))
     rate, bend = -since / width**2 * grown, (since**2 / width**4 - 1 / width**2) * grown
@@ -84,8 +93,11 @@ def pushed(seed: int, mass: float = 0.5) -> dict[str, np.ndarray]:
     return {"force": force, "position": grown * wave + noise}
 
 
-def test_a_right_model_of_a_derived_output_is_at_its_noise(tmp_path: Path) -> None:
+@pytest.mark.parametrize("width", [2.0, 1000.0], ids=["rests at its ends", "moves at its ends"])
+def test_a_right_model_of_a_derived_output_is_at_its_noise(tmp_path: Path, width: float) -> None:
     rates = (1 / DT, 1 / DT)
-    found = compare(studied(tmp_path, PUSHED, [pushed(1)], [pushed(2)], UNITS, ACCELERATION, rates))
+    logs = [pushed(1, width=width)], [pushed(2, width=width)]
+    found = compare(studied(tmp_path, PUSHED, *logs, UNITS, ACCELERATION, rates))
     assert found.parameters["m"].value == pytest.approx(0.5, rel=2e-3)
     assert found.noise_floor == pytest.approx(found.held_out_error, rel=0.25)
+    assert found.held_out_error < 2 * LEFT_OF_NOISE
