@@ -24,6 +24,7 @@ ACTS = {
 WHERE_TO_LOOK = (
     "on the dashboard, watch the verdict and the residual: measured minus modelled acceleration;",
     "its change, drawn in the same plot, stays between the red limits while the rig is healthy",
+    "each fault raises two alarms: that something has changed, and then what it is",
 )
 NEUTRAL = {"coulomb": 0.0, "actuator_gain": 1.0}
 CAUSE_FOLLOWS = (
@@ -316,6 +317,7 @@ class Narrator:
         """Say that an alarm stands until somebody has seen it, and the command for that."""
         if self._attended and ended.state == "cleared_unacknowledged":
             self._say("            the alarm is kept until somebody says that it was seen:")
+            self._say("            (try it in another terminal: the demo goes on meanwhile)")
             self._say(f"              $ rigwatch ack {self._config} {ended.name}")
 
     def _delay(self, alarm: Alarm) -> str:

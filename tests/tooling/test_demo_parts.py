@@ -185,6 +185,7 @@ def test_the_wait_for_the_next_fault_is_told_at_the_start_and_after_each_one() -
     narrator.begin(5 * RATE)
     assert "the demo puts faults into the rig and takes them out, every 120 s" in said[0]
     assert any("on the dashboard, watch the verdict" in line for line in said)
+    assert any("each fault raises two alarms" in line for line in said)
     assert "the first fault comes in 15 s; Ctrl-C ends the demo" in said[-1]
     narrator.samples(40 * RATE)
     assert "dry friction" in said[-1]
