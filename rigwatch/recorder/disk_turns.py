@@ -22,6 +22,11 @@ MOST_SYNCS = 16
 """Files of a disk that are synced at the same time: to hand one to a thread costs as much as a
 small sync."""
 Together = Callable[[], AbstractContextManager[object]]
+Collect = Callable[[], None]
+
+
+def _collect_nothing() -> None:
+    """Each recording takes what is its own."""
 
 
 class Turn(Protocol):
@@ -50,10 +55,13 @@ class DiskTurns:
 
     Args:
         together: entered for each part of a turn, so that what it sends leaves together.
+        collect: called before each part: takes what has come for several recordings.
     """
 
-    def __init__(self, together: Together = nullcontext) -> None:
-        self._together = together
+    def __init__(
+        self, together: Together = nullcontext, collect: Collect = _collect_nothing
+    ) -> None:
+        self._together, self._collect = together, collect
         self._turns: dict[tuple[int, float], Turns] = {}
         self._lock = threading.Lock()
 
@@ -77,12 +85,13 @@ class DiskTurns:
         with self._lock:
             if (disk, every) not in self._turns:
                 syncs = ThreadPoolExecutor(MOST_SYNCS, "sync")
-                before = partial(_begin_all, syncs)
+                before = partial(_begin_all, self._collect, syncs)
                 self._turns[disk, every] = Turns(every, self._together, before=before, part=PART)
             return self._turns[disk, every]
 
 
-def _begin_all(syncs: Executor, turns: Sequence[Turn]) -> None:
+def _begin_all(collect: Collect, syncs: Executor, turns: Sequence[Turn]) -> None:
+    collect()
     for turn in turns:
         turn.begin()
     groups = min(len(turns), MOST_SYNCS)

@@ -84,7 +84,7 @@ class Feed:
 
     def take(self) -> list[Message]:
         """Messages received since the last call; does not wait."""
-        found = self._counted(list(self._reader.read(0.0)))
+        found = self._counted(self._samples())
         for subscription in self._others:
             found += self._drained(subscription)
             if isinstance(subscription, CompleteSubscription):
@@ -94,6 +94,9 @@ class Feed:
     def rest(self) -> list[Message]:
         """What was taken and still waits, at the end."""
         return []
+
+    def _samples(self) -> list[Message]:
+        return [*self._reader.read(0.0)]
 
     def _counted(self, found: list[Message]) -> list[Message]:
         for item in found:

@@ -56,6 +56,7 @@ from rigwatch.wire.rig_config import RecorderSection, RigConfig, load_rig, rig_t
 from rigwatch.wire.session import run_info
 
 PROCESS, REMOTE = RECORDERS
+FeedOf = Callable[..., Feed]
 HEALTH_EVERY = 1.0
 UNSETTLED_NS = 2_000_000_000
 """Age of messages that count as recorded once the disk has been written [ns]."""
@@ -71,10 +72,17 @@ class Recorder:
         run: description written at the head of every segment.
         bus: source of the messages.
         catch_up: see `Feed`.
+        feed_of: makes the feed of a recorder at the rig's site, as `Feed` does.
     """
 
     def __init__(
-        self, config: RigConfig, run: RunInfo, bus: Bus, catch_up: float = CATCH_UP
+        self,
+        config: RigConfig,
+        run: RunInfo,
+        bus: Bus,
+        catch_up: float = CATCH_UP,
+        *,
+        feed_of: FeedOf = Feed,
     ) -> None:
         self.settings = config.recorder or RecorderSection()
         root, remote = Path(self.settings.folder), self.settings.remote
@@ -84,7 +92,7 @@ class Recorder:
         if remote:
             self.feed: Feed = RemoteFeed(bus, place, catch_up)
         else:
-            self.feed = Feed(bus, place.last, place.positions, catch_up=catch_up)
+            self.feed = feed_of(bus, place.last, place.positions, catch_up=catch_up)
         self._bus, self._run = bus, run
         self._length = SessionLength(self.settings.session_days, age_of(place.folder, run))
         self._settled = self._noted = 0
@@ -260,6 +268,7 @@ def record(
     pulse: Pulse,
     *,
     disks: DiskTurns | None = None,
+    feed_of: FeedOf = Feed,
 ) -> Path:
     """Record until `stop` is set, telling `pulse` of each turn; returns the session's folder.
 
@@ -268,6 +277,7 @@ def record(
         stop: ends the recording.
         pulse: is told of each turn.
         disks: those of the process, if it records several rigs.
+        feed_of: see `Recorder`.
 
     Raises:
         SessionError: another process records this rig into the same folder.
@@ -276,7 +286,8 @@ def record(
     kept = Kept(root / f".{config.rig.id}.lock", f"{root}: recording of {config.rig.id}")
     try:
         # Others wait for their turns: what rings have is taken as their answers come.
-        recorder = Recorder(config, run, bus, CATCH_UP if disks is None else 0.0)
+        catch_up = CATCH_UP if disks is None else 0.0
+        recorder = Recorder(config, run, bus, catch_up, feed_of=feed_of)
         pulse.ready(f"recording to {recorder.store.folder}")
         turn = _Turn(recorder, kept, bus, pulse)
         every = recorder.settings.flush * _OF_FLUSH

@@ -5,11 +5,13 @@ other, and a disk that hangs delays those of no other disk.
 """
 
 import threading
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
 from rigwatch.recorder.disk_turns import DiskTurns
-from rigwatch.recorder.process import PROCESS, describe_run, process_name, record
+from rigwatch.recorder.feed import Feed
+from rigwatch.recorder.process import PROCESS, FeedOf, describe_run, process_name, record
 from rigwatch.wire.bus import SharedLinks, joined
 from rigwatch.wire.host import (
     Heartbeat,
@@ -28,17 +30,34 @@ MANY = 32
 """Rigs from which on blocks are read by a compiled call: the compiler takes 130 MB once."""
 
 
-def work_of(
-    path: Path, notes: str, folders: dict[Path, Path], links: SharedLinks, disks: DiskTurns
-) -> Work:
-    """The recording of one rig; it writes its session's folder into `folders` at its end."""
+@dataclass(frozen=True, eq=False)
+class _Process:
+    """What the recordings of a process share.
+
+    Attributes:
+        notes: for their descriptions.
+        links: to routers.
+        disks: their turns.
+        folders: of the last session of each, written at its end.
+    """
+
+    notes: str
+    links: SharedLinks
+    disks: DiskTurns
+    folders: dict[Path, Path] = field(default_factory=dict)
+
+
+def work_of(path: Path, feed_of: FeedOf, process: _Process) -> Work:
+    """The recording of one rig."""
 
     def work(stop: threading.Event, pulse: RigPulse) -> None:
         config = load_rig(path)
-        with joined(config, process_name(config), stop, pulse.say, links) as bus:
+        with joined(config, process_name(config), stop, pulse.say, process.links) as bus:
             if bus is not None:
-                run = describe_run(path, config, notes)
-                folders[path] = record(config, run, bus, stop, pulse, disks=disks)
+                run = describe_run(path, config, process.notes)
+                process.folders[path] = record(
+                    config, run, bus, stop, pulse, disks=process.disks, feed_of=feed_of
+                )
 
     return work
 
@@ -56,19 +75,27 @@ def run_several(paths: list[Path], stop: threading.Event, notes: str = "") -> li
         ConfigError: no configuration is valid, or two are of one rig.
     """
     use_few_pools()
-    if len(paths) >= MANY:
-        from rigwatch.wire.quick_joining import join_quickly  # with the compiler
-
-        join_quickly()
-    folders: dict[Path, Path] = {}
+    feeds = _feeds(len(paths))
     valid_rigs(paths)  # a wrong file is named by its rig's thread
     keep_memory_tidy(stop)
     links = SharedLinks(len(paths))
-    disks = DiskTurns(links.together)
+    process = _Process(notes, links, DiskTurns(links.together, links.collect))
     parts = [
-        Part(str(path), work_of(path, notes, folders, links, disks), partial(used, path))
-        for path in paths
+        Part(str(path), work_of(path, feed, process), partial(used, path))
+        for path, feed in zip(paths, feeds, strict=True)
     ]
     run_side_by_side(parts, Heartbeat(PROCESS), stop, set_at_hangup())
     links.close()
-    return [folders[path] for path in paths if path in folders]
+    return [process.folders[path] for path in paths if path in process.folders]
+
+
+def _feeds(rigs: int) -> list[FeedOf]:
+    """What makes the feed of each rig of a process."""
+    if rigs < MANY:
+        return [Feed] * rigs
+    from rigwatch.recorder.row_feed import RowFeed, Rows  # with the compiler
+    from rigwatch.wire.quick_joining import join_quickly
+
+    join_quickly()
+    rows = Rows(rigs)
+    return [partial(RowFeed, rows, number) for number in range(rigs)]

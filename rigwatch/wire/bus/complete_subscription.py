@@ -23,6 +23,7 @@ from rigwatch.wire.bus.member import Member
 from rigwatch.wire.bus.message_ring import SAID_KEY, ring_key
 from rigwatch.wire.bus.ring_questions import REPLY_TIMEOUT, RingQuestions
 from rigwatch.wire.bus.sender import Sender
+from rigwatch.wire.bus.several import JointReceiver, Share, Source
 from rigwatch.wire.bus.subscription import QUEUE_CAPACITY, Subscription
 from rigwatch.wire.bus.tokens import EarlyMessages, sender_named
 from rigwatch.wire.bus.transport import MAX_PAYLOAD
@@ -208,6 +209,52 @@ class CompleteSubscription(Subscription):
             self.rejected += rejected
             found += messages
         return found
+
+    @property
+    def joint(self) -> JointReceiver | None:
+        """What receives the messages of this rig among those of others; None if nothing does."""
+        return self._inbox.outside.of if isinstance(self._inbox.outside, Share) else None
+
+    def may_hold(self) -> bool:
+        """Whether something may wait: a look that costs less than the number of messages."""
+        return bool(self._ready or self._reports) or self._inbox.may_hold()
+
+    def open_row(self, device: str, boot: int, following: int) -> bool:
+        """Leave blocks that simply follow to the row of this rig, if it can have one.
+
+        That is until `close_row` is called, or something else comes. What the row has taken is told
+        by `went_on`, before anything is read here again.
+
+        Args:
+            device, boot: of the last block.
+            following: number of the sample after it.
+        """
+        outside, going = self._inbox.outside, self._going_on()
+        if not isinstance(outside, Share) or going is None or self.may_hold():
+            return False
+        run, number, sender = going
+        source = Source(sender, device, boot, lambda _: True)
+        message = run, number + 1
+        return outside.of.open(outside, source, following, self._inbox.is_read, message)
+
+    def _going_on(self) -> tuple[int, int, str] | None:
+        """Run, number and sender of the last message, if one process alone has ever sent any."""
+        if self._shares is not None or len(self._senders) != 1:
+            return None
+        ((process, peer),) = self._senders.items()
+        going = peer.going_on
+        return going if going and self._runs.get(going[0]) == [process] else None
+
+    def close_row(self) -> None:
+        """Read all that comes here again."""
+        self._inbox.keep_order()
+
+    def went_on(self, count: int) -> None:
+        """The row has taken so many messages since it was opened, or since that was told before."""
+        if count:
+            (peer,) = self._senders.values()
+            peer.went_on(count)
+            self._heard()
 
     def reports(self) -> list[Gap | Event]:
         """Reports of losses that this subscriber has published since the last call."""

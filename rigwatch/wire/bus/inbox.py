@@ -50,6 +50,10 @@ class Inbox(Generic[T]):
         if self._outside is not None:
             self._outside.take()
         self._items.put(item)
+        self.keep_order()
+
+    def keep_order(self) -> None:
+        """Nothing outside may overtake what waits, or is to be read, here."""
         if self._outside is not None:
             self._outside.keep_order()
 

@@ -71,6 +71,21 @@ class Sender:
         admitted = self._may_speak(run.boot) and self._owners.admits(run.boot, sender)
         return admitted and self.order.goes_on(run)
 
+    @property
+    def going_on(self) -> tuple[int, int, str] | None:
+        """Run and number of the last message, and who sends the next one if it is delivered at
+        once; otherwise None.
+        """
+        place = self.order.goes_on_after
+        owner = "" if place is None else self._owners.owner_of(place[0])
+        if place is None or not owner or not self._may_speak(place[0]):
+            return None
+        return (*place, owner) if self._owners.admits(place[0], owner) else None
+
+    def went_on(self, count: int) -> None:
+        """So many messages that follow have been delivered, where `going_on` says so."""
+        self.order.went_on(count, Numbered.t_ns[0])
+
     def is_owner(self, sender: str) -> bool:
         """Whether `sender` owns a run that lives, or has just ended."""
         runs = [run for run in (*self._alive, *self._ended) if self._may_speak(run)]

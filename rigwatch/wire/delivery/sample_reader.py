@@ -213,8 +213,7 @@ class SampleReader:
 
     def close_row(self) -> None:
         """Read all that comes here again."""
-        if isinstance(self._inbox.outside, Share):
-            self._inbox.outside.keep_order()
+        self._inbox.keep_order()
 
     def went_on(self, count: int, heard_at: float, t_ns: int) -> None:
         """The row has taken samples since it was opened.

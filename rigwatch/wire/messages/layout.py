@@ -136,26 +136,29 @@ class Layout:
 
 @dataclass(frozen=True, eq=False)
 class Form:
-    """What blocks of samples of one boot and length have in common.
+    """What blocks of one boot and length have in common.
 
     Attributes:
         device, boot: of which they are.
-        samples: of each.
-        names: of their columns.
+        layout: of the first of them.
         fixed: the bytes that they share, with zeros for the flags of quality, and elsewhere.
         mask: 255 where bytes have to be those, else 0.
         facts: where the rest lies.
-        columns: the offset of each column's values.
+        words: the offsets of times, then of each column's values.
     """
 
     device: str
     boot: int
-    samples: int
-    names: Names
+    layout: Layout
     fixed: NDArray[np.uint8]
     mask: NDArray[np.uint8]
     facts: tuple[int, ...]
-    columns: tuple[int, ...]
+    words: tuple[int, ...]
+
+    @property
+    def names(self) -> Names:
+        """Of their columns."""
+        return self.layout.names
 
 
 @lru_cache(maxsize=NAMES_KEPT)

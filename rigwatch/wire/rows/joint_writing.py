@@ -24,7 +24,7 @@ from rigwatch.wire.rows.estimate_rows import (
     source_head,
     write_block,
 )
-from rigwatch.wire.rows.joint_rows import LONGEST_ID
+from rigwatch.wire.rows.named_rows import LONGEST_ID
 
 _HEAD, _LENGTHS, _MARK = 2, 8, 16
 

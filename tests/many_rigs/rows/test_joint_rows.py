@@ -88,7 +88,7 @@ def test_the_lengths_of_a_busy_machine_are_learnt_once_or_twice() -> None:
     names = tuple((name, unit, True) for name, unit in NAMES)
 
     def suits(form: Form) -> bool:
-        learnt.append(form.samples)
+        learnt.append(form.layout.samples)
         return form.names == names
 
     following = 20_000  # from here on the number takes as many bytes

@@ -73,23 +73,29 @@ class JointReceiver:
             return self.rows is not None and self.rows.name(row, rig)
 
     def open(
-        self, share: "Share", source: Source, following: int, is_read: Callable[[], bool]
+        self,
+        share: "Share",
+        source: Source,
+        following: int,
+        is_read: Callable[[], bool],
+        message: tuple[int, int] | None = None,
     ) -> bool:
         """Open the row of a rig whose only reader this is, if its messages come joined and none
         waits.
 
         Args:
             share: of the reader.
-            source: whose samples the row takes.
-            following: number of the next one.
+            source: whose blocks the row takes.
+            following: number of the next sample.
             is_read: whether the reader has taken all that was passed on to it.
+            message: run and number of the next message, None in a topic that is not numbered.
         """
         with self._lock:
             alone = len(self._rigs.get(share.rig, ())) == 1
             ready = share.comes_joined and not share.waiting and is_read()
             if self.rows is None or not alone or not ready:
                 return False
-            return self.rows.open(share.rig, source, following)
+            return self.rows.open(share.rig, source, following, message)
 
     def close(self, rig: str) -> None:
         """Close the row of a rig: all that comes is handed out."""

@@ -13,7 +13,7 @@ from rigwatch.wire.messages import Form
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """Whose samples a row takes.
+    """Whose blocks a row takes.
 
     Attributes:
         sender: identity of the process that sends them.
@@ -37,8 +37,17 @@ class OpenRows(Protocol):
     def name(self, row: int, rig: str) -> bool:
         """Give a row to a rig; False if it can have none, or has another one."""
 
-    def open(self, rig: str, source: Source, following: int) -> bool:
-        """Take what follows of a rig from now on, if it has a row."""
+    def open(
+        self, rig: str, source: Source, following: int, message: tuple[int, int] | None
+    ) -> bool:
+        """Take what follows of a rig from now on, if it has a row.
+
+        Args:
+            rig: its id.
+            source: of its blocks.
+            following: number of the next sample.
+            message: run and number of the next message, None in a topic that is not numbered.
+        """
 
     def close(self, rig: str) -> None:
         """Take no more of a rig."""
