@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from rigwatch.physics.engine.equations.system import Placement
-from rigwatch.workbench.compare import open_bench
+from rigwatch.workbench.compare import Bench, open_bench
 from rigwatch.workbench.explain import with_whole_library
 from rigwatch.workbench.explain.sets.combination import Combination, best_in_training, with_rows
 from rigwatch.workbench.explain.sets.combinations import _substitutes
-from rigwatch.workbench.explain.sets.enlarging import scored_with
+from rigwatch.workbench.explain.sets.enlarging import all_fitted, all_tried, scored_with
 from rigwatch.workbench.explain.sets.several_effects import _judge_each, _ranked_with
 from rigwatch.workbench.ranking import candidates, no_progress, rank, refit, scored
 from rigwatch.workbench.ranking.rank import _substitute_of_vague, _unfitted_similar
@@ -150,3 +150,20 @@ def test_a_second_pass_extends_the_sets_of_the_first_by_rarer_effects(tmp_path: 
     assert rarer
     assert all(bench.study.effects[name].elective for name in rarer)
     assert usual == {each.effect for each in scored_with(bench, Combination((row,)))}
+
+
+def test_a_set_that_a_second_pass_makes_once_more_is_fitted_once(tmp_path: Path) -> None:
+    bench = open_bench(damper(tmp_path, lambda x, v: 4 * np.tanh(v / 0.002) + 2e6 * x**3))
+    rows = {row.label: row for row in rank(bench.study, bench.data, bench.base, bench.floor)}
+    stiffer = Combination((rows["cubic_stiffness@load"],))
+
+    def extended(pass_: Bench) -> Combination:
+        beside = {row.label: row for row in scored_with(pass_, stiffer)}
+        (larger,) = all_tried(pass_, [(stiffer, beside["coulomb@load"])])
+        (made,) = all_fitted(pass_, [larger])
+        return made
+
+    first = extended(bench)
+    second = extended(replace(bench, study=with_whole_library(bench.study)))
+    assert second.fitted is first.fitted
+    assert second.rows[-1].accepted == first.rows[-1].accepted

@@ -1,8 +1,10 @@
 """Sets with another effect: scored, tried on a part of long recordings, fitted to the whole."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
 from weakref import WeakKeyDictionary
 
 from rigwatch.physics.engine.compile import side_by_side
@@ -15,10 +17,10 @@ from rigwatch.workbench.explain.sets.combination import (
     with_rows,
 )
 from rigwatch.workbench.explain.sets.part_trial import Trial, tried
-from rigwatch.workbench.fit import Fitted, TrainingPart, fit_model, part_of
+from rigwatch.workbench.fit import Fitted, TrainingPart, part_of
 from rigwatch.workbench.ranking import (
     MATERIAL,
-    Fitting,
+    Order,
     Ranked,
     candidates,
     fit_started,
@@ -32,6 +34,12 @@ _ON_PART: WeakKeyDictionary[Fitted, float] = WeakKeyDictionary()
 _SCORED: WeakKeyDictionary[Fitted, dict[bool, list[Ranked]]] = WeakKeyDictionary()
 """Scores of all effects by the fit they were scored along, and by whether the whole library was
 ranked: sets share the fits of their parts, and a second pass those of the first."""
+
+_Begun = tuple[Any, ...]
+_TRIED: WeakKeyDictionary[Fitted, dict[_Begun, Trial | None]] = WeakKeyDictionary()
+_FITTED: WeakKeyDictionary[Fitted, dict[_Begun, Ranked]] = WeakKeyDictionary()
+"""Trials and fits of a further effect beside those of a fit, by the effect and where they began: a
+second pass makes many of the sets of the first once more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +83,11 @@ def all_tried(bench: Bench, waiting: Sequence[tuple[Combination, Ranked]]) -> li
 
     def larger(each: tuple[Combination, Ranked]) -> Larger:
         known, row = each
-        return Larger(
-            known, row, tried(with_rows(bench.study, known.rows), part, known.fitted, row)
-        )
+        kept, begun = _TRIED.setdefault(known.fitted, {}), _begun(row)
+        if begun not in kept:
+            study = with_rows(bench.study, known.rows)
+            kept[begun] = tried(study, part, known.fitted, row)
+        return Larger(known, row, kept[begun])
 
     return [each for each in side_by_side(larger, waiting) if each.trial]
 
@@ -106,6 +116,12 @@ def error_on_part(bench: Bench, known: Combination) -> float:
     return _ON_PART[known.fitted]
 
 
+def _begun(row: Ranked, starts: Mapping[Order, Mapping[str, float]] | None = None) -> _Begun:
+    """An effect, and where its fit begins."""
+    begins = [row.begin(), *(starts or {}).values()]
+    return row.label, *(starts or {}), *(tuple(sorted(values.items())) for values in begins)
+
+
 def all_fitted(bench: Bench, larger: Sequence[Larger]) -> list[Combination]:
     """Sets with another effect each, fitted side by side; without those that cannot be fitted."""
     found = side_by_side(lambda each: _enlarged(bench, each), larger)
@@ -115,9 +131,7 @@ def all_fitted(bench: Bench, larger: Sequence[Larger]) -> list[Combination]:
 def _enlarged(bench: Bench, larger: Larger) -> Combination | None:
     """A set with another effect; None if it cannot be fitted."""
     known, row = larger.known, larger.row
-    starts = larger.trial.starts if larger.trial else {}
-    fitting = fit_started(lambda _, placements: starts.get(order_of(placements[-1]), {}))
-    fit_with(bench, known.rows, known.fitted, row, fitting)
+    fit_with(bench, known.rows, known.fitted, row, larger.trial.starts if larger.trial else {})
     return None if row.fitted is None else combination_of(bench, (*known.rows, row))
 
 
@@ -141,7 +155,20 @@ def fit_with(
     rows: Sequence[Ranked],
     fitted: Fitted,
     row: Ranked,
-    fitting: Fitting = fit_model,
+    starts: Mapping[Order, Mapping[str, float]] = MappingProxyType({}),
 ) -> None:
-    """Fit an effect with others in the model, starting from their fit."""
-    refit(with_rows(bench.study, rows), bench.data, fitted, row, fitting)
+    """Fit an effect with others in the model, starting from their fit; once from the same start.
+
+    Args:
+        bench: the study.
+        rows: the others.
+        fitted: their fit.
+        row: the effect, to which its fit and the decision are stored.
+        starts: parameters to begin with, by the effect's place before or after others at its port.
+    """
+    kept, begun = _FITTED.setdefault(fitted, {}), _begun(row, starts)
+    if begun not in kept:
+        fitting = fit_started(lambda _, placements: starts.get(order_of(placements[-1]), {}))
+        refit(with_rows(bench.study, rows), bench.data, fitted, row, fitting)
+        kept[begun] = replace(row)
+    row.take(kept[begun])
