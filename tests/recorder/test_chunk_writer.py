@@ -49,6 +49,18 @@ def test_a_library_of_another_shape_is_used_as_it_is(monkeypatch: pytest.MonkeyP
     assert written(chunk_writer) == written(plain)
 
 
+def test_the_chunk_of_a_recorder_that_was_held_up_leaves_nothing_with_the_process() -> None:
+    writer, random = chunk_writer(BytesIO()), np.random.default_rng(1)
+    writer.start()
+    channel = writer.register_channel("a", "json", 0)
+    kept = []
+    for size in (22_000, 22_000, 300_000, 22_000):
+        writer.add_message(channel, 1, random.bytes(size), 1)
+        writer.flush()
+        kept.append(chunks_written._compressor.memory_size())
+    assert kept[-1] == kept[1] > 0
+
+
 def test_a_chunk_takes_few_bytes_of_memory_until_the_file_is_closed(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     chunks = 2000
