@@ -28,9 +28,10 @@ _NAME = b"zstd"
 _NAMES = ("chunk_builder", "chunk_indices", "data_section_crc", "flush", "statistics", "stream")
 _compressor, _compressing = zstandard.ZstdCompressor(), threading.Lock()
 SHARED = 1 << 15
-"""Size of a chunk up to which all share a compressor, which saves most of its time [bytes]. It keeps
-room for the largest that it was given: 0.7 MB for one of this size, and 1.5 MB for that of a recorder
-that was held up once.
+"""Size of a chunk up to which all share a compressor, which saves most of its time [bytes].
+
+It keeps room for the largest that it was given: 0.7 MB for one of this size, 1.5 MB for that of a
+recorder that was held up once.
 """
 
 
