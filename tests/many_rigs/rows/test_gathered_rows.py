@@ -19,6 +19,7 @@ from rigwatch.wire.messages import (
     Gap,
     Message,
     SampleBlock,
+    cut,
     encode,
 )
 from rigwatch.wire.session import merge_pending
@@ -128,9 +129,9 @@ def site() -> Site:
 
 def run(site: Site, rigs: list[Rig], turns: int, what: Callable[..., None] = undisturbed) -> None:
     for turn in range(turns):
-        for _ in range(PIECES):
+        for piece in range(PIECES):
             sent = [rig.next() for rig in rigs]
-            (what if turn % 7 == 3 else undisturbed)(site, sent)
+            (what if turn % 7 == 3 and piece in (2, 3) else undisturbed)(site, sent)
         site.take()
 
 
@@ -219,7 +220,17 @@ def jump(site: Site, sent: list[tuple[SampleBlock, EstimateBlock]]) -> None:
     undisturbed(site, sent)
 
 
-TROUBLES = (flag, drop, repeat, set_clock_back, forge, send_alone, jump)
+def lose_a_number(site: Site, sent: list[tuple[SampleBlock, EstimateBlock]]) -> None:
+    """A message without estimates is lost: only the number of the next one tells."""
+    site.network.up = False
+    with site.monitor.together():
+        for bus, (_, estimates) in zip(site.monitors, sent, strict=True):
+            bus.publish(ESTIMATES, cut(estimates, 0, 0))
+    site.network.up = True
+    undisturbed(site, sent)
+
+
+TROUBLES = (flag, drop, repeat, set_clock_back, forge, send_alone, jump, lose_a_number)
 
 
 @pytest.mark.parametrize("trouble", TROUBLES, ids=[one.__name__ for one in TROUBLES])
