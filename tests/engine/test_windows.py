@@ -44,6 +44,17 @@ parameters.k = { value = 1.0, unit = "1" }
 outputs.tooth = { unit = "1", expression = "cos(8*angle)" }
 outputs.turn = { unit = "1", expression = "angle" }
 """
+CHARGED = """
+name = "charged"
+summary = "a slow level that a fast charge once fed, both seen"
+inputs.speed = { unit = "1/s" }
+states.level = { unit = "1", derivative = "slow*(k*speed - level) + slow*charge**2" }
+states.charge = { unit = "1", derivative = "-fast*charge", start = 1.0 }
+parameters.k = { value = 1.0, unit = "s" }
+parameters.slow = { value = 0.5, unit = "1/s", fixed = true }
+parameters.fast = { value = 20.0, unit = "1/s", fixed = true }
+outputs.y = { unit = "1", expression = "level + charge" }
+"""
 
 
 def limited(command: np.ndarray, most: float) -> np.ndarray:
@@ -94,6 +105,21 @@ def test_the_score_sees_the_same_limiter(recording):
     # Each window begins in a state that has been measured: what came before it does not count.
     late = np.arange(N) % HORIZON > 40
     assert np.corrcoef(moved[late], wanted[late])[0, 1] > 0.99
+
+
+def test_a_fast_state_that_is_forgotten_does_not_hide_where_a_slow_one_begins():
+    compiled = compile_system(compose(parse(CHARGED, Model, "charged")))
+    noise = 0.01 * np.random.default_rng(2).normal(size=N)
+    y = 3.0 * np.exp(-0.5 * DT * np.arange(N)) + noise
+    # When the samples begin to count, 1e-9 of the charge is left, and noise asks for 1e5 of it.
+    y[: N // 4] = np.nan
+    slow = Recording(DT, np.zeros((N, 1)), y[:, None])
+    problem = Problem(
+        compiled, slow, N, scale=np.array([0.01]), substeps=2, initial=np.array([[1.0, 1.0]])
+    )
+    problem.recall(compiled.parameters)
+    problem.settle(compiled.parameters)
+    assert problem.initial[0, 0] == pytest.approx(3.0, abs=0.1)
 
 
 def test_a_window_whose_initial_state_went_astray_begins_where_the_one_before_ended():

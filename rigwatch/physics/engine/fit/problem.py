@@ -388,8 +388,8 @@ class Problem:
         """Fit the initial states; return scaled residuals and slopes there.
 
         Each window takes its own Gauss-Newton steps until they no longer help. A step that
-        increases the error, as one that leaves the play of a valve does, is repeated with a quarter
-        of its length.
+        increases the error, as one that leaves the play of a valve does, is repeated without what
+        the samples leave open, then with a quarter of its length.
 
         Args:
             parameters: all parameters, shape (n_p,).
@@ -409,7 +409,7 @@ class Problem:
             )
         if not self.system.states:
             return error, slopes
-        step = self._steps(error, slopes, rows)
+        step, reduced = self._steps(error, slopes, rows), np.zeros(len(rows), np.bool_)
         for further in reversed(range(steps - 1)):
             size = np.sum(error**2, axis=1)
             (moving,) = np.nonzero(self.predicted_reduction(step, slopes) > least_reduction * size)
@@ -427,7 +427,11 @@ class Problem:
             )
             if further:
                 step[improved] = self._steps(error[improved], slopes[improved], rows[improved])
-                step[moving[~better]] /= 4
+                failed, reduced[improved] = moving[~better], False
+                step[failed[reduced[failed]]] /= 4
+                first = failed[~reduced[failed]]
+                step[first] = self._determined_steps(error[first], slopes[first], best[first])
+                reduced[first] = True
         self.initial = self.initial.copy()
         self.initial[rows] = best
         return error, slopes
@@ -440,6 +444,25 @@ class Problem:
     def _steps(self, error: FloatArray, slopes: FloatArray, rows: IntArray) -> FloatArray:
         """Gauss-Newton step of each window's initial state, shape (rows, states)."""
         return np.asarray(self._tangent(slopes, rows).solve(error[..., None])[..., 0])
+
+    def _determined_steps(
+        self, error: FloatArray, slopes: FloatArray, initial: FloatArray
+    ) -> FloatArray:
+        """Steps along what the samples determine of initial states, shape (rows, states).
+
+        Of a fast state little is left in the first sample that counts. A step along it may be many
+        times its size, where nothing is linear, and hide what a slow state would explain. A
+        direction is left out if a change by the states' own sizes changes the squared error by less
+        than one: by less than noise does.
+        """
+        size = np.where(initial == 0.0, 1.0, np.abs(initial))
+        known = np.zeros(initial.shape[1])
+        known[self._unknown] = 1.0
+        own = slopes[..., len(self.free) :] * (size * known)[:, None, :]
+        basis, sizes, turn = np.linalg.svd(own, full_matrices=False)
+        inverse = np.where(sizes >= 1.0, 1.0 / np.maximum(sizes, 1.0), 0.0)
+        along = np.einsum("wks,wk->ws", basis, error) * inverse
+        return np.asarray(size * known * np.einsum("wsj,ws->wj", turn, along))
 
     def _tangent(self, slopes: FloatArray, rows: IntArray) -> Tangent:
         """Projection of the unknown initial states; input-driven states are known later on."""
