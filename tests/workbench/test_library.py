@@ -8,7 +8,6 @@ import pytest
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording
-from rigwatch.workbench.compare import open_bench
 from rigwatch.workbench.compare.preparation import bench_of
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.ranking.scoring import rank_all
@@ -16,13 +15,10 @@ from rigwatch.workbench.study.study import Study
 from rigwatch.workbench.study.study_file import Accepted, Span, StudyFile
 from sim_plant.specimens import HIDDEN, specimen
 from sim_plant.specimens.specimen import NOISE
-from tests.workbench.dampers import damper
 
 SAMPLES, HORIZON = 640, 128
 LEAST = 60
 """Effects that the library holds at least."""
-SIZE = 0.0147
-"""Root mean square of the damper's travel [m]."""
 HELD_ALREADY = {"convection"}
 """The heated block conducts to its surroundings by the same law."""
 
@@ -75,14 +71,3 @@ def test_every_effect_of_a_file_stands_in_one_file_alone() -> None:
     ]
 
     assert len(heads) == len(set(heads)) == len(library())
-
-
-@pytest.mark.parametrize("share", [0.11, 0.17, 0.42, 0.85, 1.25])
-def test_cogging_is_named_whatever_its_pitch(tmp_path: Path, share: float) -> None:
-    pitch = share * SIZE
-
-    bench = open_bench(damper(tmp_path, lambda x, v: 2 * np.sin(2 * np.pi * x / pitch + share)))
-    first = rank_all(bench.study, bench.data, bench.base)[0]
-
-    assert first.label == "periodic_force@load"
-    assert first.explained > 0.3
