@@ -78,6 +78,30 @@ def test_a_direction_is_the_derivative_of_the_composed_model(name, port):
     assert wrong <= 2e-2 * np.sqrt(np.mean(expected**2))
 
 
+@pytest.mark.parametrize("name", ["constant_force", "cubic_stiffness", "viscous"])
+def test_a_direction_does_not_grow_where_a_decay_is_faster_than_the_steps(name):
+    effect, u = ready(name), excitation()[:120]
+    steps = 4 / DT
+    drag = 2.5 * TRUE["m"] * steps
+    whole = compile_system(compose(MODEL, [Placement(name, effect, "load")]))
+    strength = f"load_{name}_{effect.strength}"
+    starts, known = np.array([0]), {**TRUE, "c": drag}
+    run = whole.simulate(
+        u, DT, starts, len(u), initial=np.array([[0.03, 0.0]]),
+        parameters=whole.vector({**known, strength: 0.0}), substeps=16,
+    )  # fmt: skip
+    expected = run.slopes[..., whole.system.free.index(strength)]
+    bare = compile_system(compose(MODEL))
+    at = trajectory(
+        bare, u, DT, starts, len(u), initial=np.array([[0.03, 0.0]]),
+        parameters=bare.vector(known), substeps=4,
+    )  # fmt: skip
+    found = directions(at, [Candidate(name, effect, "load", {})])[..., 0]
+    moved = [list(MODEL.outputs).index("position")]
+    wrong = np.sqrt(np.mean((found - expected)[..., moved] ** 2))
+    assert wrong <= 2e-2 * np.sqrt(np.mean(expected[..., moved] ** 2))
+
+
 @pytest.mark.parametrize("name", ["coulomb_running_in", "jenkins"])
 def test_what_an_effect_remembers_is_of_its_own_recording(name):
     effect, u = ready(name), excitation()[:768]

@@ -6,7 +6,8 @@ its port. The outputs then change by
     dR/dt = (∂f/∂x)·R + (∂f/∂port)·e,   ∂y/∂strength = (∂g/∂x)·R + (∂g/∂port)·e,   R(0) = 0
 
 which is one linear equation for all candidates and needs no further compilation for the model. At a
-sensor the effect changes only its own output.
+sensor the effect changes only its own output. Where the model returns to rest faster than the steps
+resolve, as a tank that is nearly empty does, they are implicit: explicit ones would grow there.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -23,10 +24,13 @@ from rigwatch.physics.engine.compile import (
     shares,
 )
 from rigwatch.physics.engine.equations import PROBE, System, hold_at, parse, symbol
-from rigwatch.physics.engine.score.candidates import Candidate
+from rigwatch.physics.engine.score.candidates import Candidate, root_mean_square
 from rigwatch.physics.engine.score.trajectory import Trajectory, memory, port_signals
 from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
 from rigwatch.wire.kernel import kernel
+
+STABLE = 2.0
+"""Rate times step up to which a decay stays one in Heun's method."""
 
 
 def directions(at: Trajectory, candidates: Sequence[Candidate]) -> FloatArray:
@@ -126,24 +130,49 @@ def _propagated(
         return np.asarray(direct * np.moveaxis(pushes[..., :: run.substeps], 0, -1)[:, :, None])
     moved = np.empty((len(columns), *run.outputs.shape))
     slopes = run.rate_slopes, run.read_slopes, run.update_slopes
+    stiff, inverses = _implicit_steps(run, free)
 
     def propagate(c: slice) -> None:
         _propagate(
-            *slopes, free, columns[c], held[c], pushes[c], run.spacing, run.substeps, moved[c]
-        )
+            *slopes, free, columns[c], held[c], pushes[c], run.spacing, run.substeps, stiff,
+            inverses, moved[c],
+        )  # fmt: skip
 
     on_all_cores(propagate, shares(len(columns)))
     return np.moveaxis(moved, 0, -1)
 
 
+def _implicit_steps(run: Linearisation, free: int) -> tuple[IntArray, FloatArray]:
+    """The steps in which Heun's method would grow what decays, and their implicit Euler steps.
+
+    Returns:
+        Place of each step among the implicit ones, -1 for Heun's, shape (windows, nodes - 1);
+        (1 - h·∂f/∂x)⁻¹ at their ends, shape (steps, n, n).
+    """
+    n, h = run.states.shape[2], run.spacing[..., None, None]
+    sizes = np.array([root_mean_square(own) for own in np.moveaxis(run.states, 2, 0)])
+    # In units of the states' sizes, so that no eigenvalues are needed where nothing is stiff.
+    scaled = h * run.rate_slopes[..., free : free + n] * sizes / sizes[:, None]
+    stiff = np.linalg.norm(scaled, axis=(2, 3)) > STABLE
+    stiff &= np.isfinite(scaled).all(axis=(2, 3))
+    rates = np.linalg.eigvals(scaled[stiff])
+    stiff[stiff] = ((np.abs(rates) > STABLE) & (rates.real < 0)).any(axis=1)
+    steps = stiff[:, :-1] | stiff[:, 1:]
+    place = np.where(steps, np.cumsum(steps).reshape(steps.shape) - 1, -1)
+    ends = (h[:, :-1] * run.rate_slopes[:, 1:, :, free : free + n])[steps]
+    return place, np.linalg.inv(np.eye(n) - ends)
+
+
 @kernel(allocates=True, nogil=True)
-def _propagate(  # noqa: C901, PLR0917 -- a kernel
+def _propagate(  # noqa: C901, PLR0912, PLR0917 -- a kernel
     rates: FloatArray, reads: FloatArray, updates: FloatArray, free: int, columns: IntArray,
-    held: BoolArray, pushes: FloatArray, spacing: FloatArray, substeps: int, moved: FloatArray,
+    held: BoolArray, pushes: FloatArray, spacing: FloatArray, substeps: int, stiff: IntArray,
+    inverses: FloatArray, moved: FloatArray,
 ) -> None:  # fmt: skip
     """Heun's method over the nodes, candidate by candidate; the outputs are read at the samples.
 
-    The last axis of the slopes is (free parameters, states, probes).
+    The last axis of the slopes is (free parameters, states, probes). `stiff` and `inverses` are
+    those of `_implicit_steps`.
     """
     candidates, windows, nodes = pushes.shape
     n = rates.shape[2]
@@ -168,13 +197,17 @@ def _propagate(  # noqa: C901, PLR0917 -- a kernel
                             value += reads[w, k, o, free + j] * response[j]
                         moved[c, w, k, o] = value
                 if node + 1 < nodes:
-                    h = spacing[w, node]
+                    h, following = spacing[w, node], node + 1
+                    jumps = held[c] and following % substeps == 0
+                    ending = push if jumps else pushes[c, w, following]
+                    if stiff[w, node] >= 0:
+                        for i in range(n):
+                            ahead[i] = response[i] + h * rates[w, following, i, column] * ending
+                        _multiply(inverses[stiff[w, node]], ahead, response)
+                        continue
                     _slopes(rates[w, node], free, column, push, response, slope)
                     for i in range(n):
                         ahead[i] = response[i] + h * slope[i]
-                    following = node + 1
-                    jumps = held[c] and following % substeps == 0
-                    ending = push if jumps else pushes[c, w, following]
                     _slopes(rates[w, following], free, column, ending, ahead, next_slope)
                     for i in range(n):
                         response[i] += 0.5 * h * (slope[i] + next_slope[i])
@@ -188,4 +221,13 @@ def _slopes(  # noqa: PLR0917 -- a kernel
         value = by[i, column] * push
         for j in range(at.size):
             value += by[i, free + j] * at[j]
+        out[i] = value
+
+
+@kernel(nogil=True)
+def _multiply(matrix: FloatArray, by: FloatArray, out: FloatArray) -> None:
+    for i in range(out.size):
+        value = 0.0
+        for j in range(by.size):
+            value += matrix[i, j] * by[j]
         out[i] = value
