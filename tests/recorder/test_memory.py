@@ -94,7 +94,7 @@ every_process = pytest.mark.parametrize(
 
 
 def printed(
-    program: str, *arguments: Path, folder: Path | None = None, timeout: float = 60.0
+    program: str, *arguments: Path | str, folder: Path | None = None, timeout: float = 60.0
 ) -> str:
     """What a program prints, in a process of its own."""
     return subprocess.run(
@@ -103,9 +103,9 @@ def printed(
     ).stdout  # fmt: skip
 
 
-def numbers_from(program: str) -> list[int]:
-    """The numbers that a program prints."""
-    return [int(word) for word in printed(program).split()]
+def numbers_from(program: str, *words: str) -> list[int]:
+    """The numbers that a program prints, called with some words."""
+    return [int(word) for word in printed(program, *words).split()]
 
 
 def said_by(folder: Path, program: str, begin: str, timeout: float) -> list[str]:
@@ -203,6 +203,40 @@ print(round(memory_kb(os.getpid()) - before))
 def test_names_of_files_that_are_gone_take_no_memory() -> None:
     (grown_kb,) = numbers_from(NAMES_OF_A_YEAR)
     assert grown_kb < 150
+
+
+NAMES_IN_USE = """
+import importlib, os, sys
+importlib.import_module(sys.argv[1])
+import rigwatch.wire.bus.zenoh_transport
+from rigwatch.wire.host import settle_memory, use_few_pools
+from tools.memory_series import memory_kb
+
+use_few_pools()
+settle_memory()
+before = memory_kb(os.getpid())
+kept = [sys.intern(f"{number:06d}.mcap") for number in range(6_000)]
+taken = sum(map(sys.getsizeof, kept)) / 1024
+for number in range(400_000):
+    sys.intern(f"gone {number}")
+print(round(memory_kb(os.getpid()) - before - taken))
+"""
+
+
+@pytest.mark.parametrize(
+    "process",
+    [
+        "rigwatch.recorder.process",
+        "rigwatch.router",
+        "rigwatch.witness",
+        "monitor.process",
+        "daq.__main__",
+    ],
+)
+@on_linux
+def test_some_thousand_names_more_do_not_double_the_table_of_names(process: str) -> None:
+    (grown_kb,) = numbers_from(NAMES_IN_USE, process)
+    assert grown_kb < 400
 
 
 FREED_BETWEEN_OTHERS = """

@@ -16,8 +16,11 @@ takes another one, which fills over weeks and stays. Its room is taken at the st
 Numpy keeps up to seven freed arrays of each size below a kilobyte, 4 MB in all. Blocks of ever new
 lengths come for months, and the flags of each leave one: all are made at the start.
 
-It keeps a table of names, of which every new file's is one: the place of a name that is gone is not
-used again until the table is full, and it then grows, once, by half a megabyte to one.
+Python keeps a table of names, of which every new file's is one. The place of a name that is gone is
+not used again until the table is full: then it is made anew, with three places for each name in
+use, rounded up to a power of two. A start leaves so many in use that a few thousand more double the
+table, by one megabyte in a recorder and by two in a monitor: in a year of recordings they did so in
+its autumn. So some names stay in use from the start, and the table is filled.
 
 Pieces that are freed between others stay with the process as well: the library gives back only what
 is free at the end of a pool, unless it is asked for all pages that hold nothing.
@@ -42,8 +45,10 @@ ARRAYS, OF_EACH = range(1, 1024), 7
 """Sizes of arrays that numpy keeps [bytes]; number of each."""
 _kept: list[bytes] = []
 """One of them: an arena without any would be given back."""
-NAMES = 1 << 16
-"""Names that fill the table: more than it has places."""
+_names: list[str] = []
+NAMES_KEPT, NAMES = 14_000, 1 << 18
+"""Names that stay in use: with them no process is near a limit, as the table doubles with 2 to 11
+thousand after a start and then with 24 and more. Names that fill it, more than it has places."""
 TIDY_EVERY = 60.0
 """Time between two collections of everything [s]; with few new objects one takes under 1 ms."""
 _NO_GLIBC = (AttributeError, OSError, TypeError)
@@ -85,6 +90,7 @@ def _fill_cache_of_arrays() -> None:
 
 
 def _fill_table_of_names() -> None:
+    _names.extend(sys.intern(f"kept {number}") for number in range(NAMES_KEPT))
     for number in range(NAMES):
         sys.intern(f"name {number}")
 
