@@ -75,9 +75,10 @@ def settle_memory() -> None:
     """
     gc.collect()
     if not _kept:
-        _kept.append([bytes(SMALL) for _ in range(ROOM // SMALL)][-1])
-        _fill_cache_of_arrays()
         _fill_table_of_names()
+        _fill_cache_of_arrays()
+        # Last, as what has been kept before has taken of the arenas' room.
+        _kept.append([bytes(SMALL) for _ in range(ROOM // SMALL)][-1])
     gc.freeze()
 
 
