@@ -53,8 +53,9 @@ from rigwatch.wire.rows.named_rows import (
     row_of,
 )
 
-ROOM = 512
-"""Samples that a row gathers before they are set aside as a block."""
+ROOM, MOST_ASIDE = 256, 4
+"""Samples that a row gathers before they are set aside as a block, and the blocks that may wait so:
+of a rig whose turn does not come, further ones are handed out, and a ring keeps them."""
 _TAKEN, _LEFT, _NEW, _FULL = range(4)
 """What has become of a part; the last two ask for something to be done first."""
 
@@ -157,8 +158,10 @@ class GatheredRows(NamedRows):
         parts, state = np.zeros((4, count), np.int64), (self.state, self._gathering)
         while 0 <= (at := _gather(raw, at, *state, known, now, parts, self._kind.times)) < count:
             row, became, begin, end = parts[:, at].tolist()
-            if became == _FULL:
+            if became == _FULL and len(self._aside[row]) < MOST_ASIDE:
                 self._set_aside(row)
+            elif became == _FULL:
+                self.state.open[row] = False
             else:
                 self._learn(row, data[begin:end])
         if at < 0:
