@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rigwatch.wire.arrays import FloatArray, IntArray
-from rigwatch.wire.bus import Part, Place, Source, join, split
+from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
+from rigwatch.wire.bus import Part, Place, Source, join
 from rigwatch.wire.kernel import kernel, part
 from rigwatch.wire.messages import (
     Block,
@@ -48,7 +48,6 @@ from rigwatch.wire.rows.named_rows import (
     RowState,
     following_form,
     is_whole,
-    left_of,
     lengths_of,
     row_of,
 )
@@ -118,18 +117,15 @@ class GatheredRows(NamedRows):
     def open(self, rig: str, source: Source, following: int, message: Place | None = None) -> bool:
         """See `NamedRows.open`. What the row had gathered before is forgotten."""
         with self._lock:
-            row = self._numbers.get(rig)
-            if row is None or not super().open(rig, source, following, message):
+            if not super().open(rig, source, following, message):
                 return False
+            row = self._numbers[rig]
             if not self.state.forms.facts[row].any():
                 self._layouts[row] = None  # blocks of another source, or with other columns
-            self._forget(row)
+            self._gathering.samples[row] = self._gathering.messages[row] = 0
+            self._aside.pop(row, None)
             self._gathering.heard_at[row] = time.monotonic()
             return True
-
-    def _forget(self, row: int) -> None:
-        self._gathering.samples[row] = self._gathering.messages[row] = 0
-        self._aside.pop(row, None)
 
     def taken(self, row: int) -> Gathered:
         """What a row has gathered since the last call, in any thread."""
@@ -141,22 +137,14 @@ class GatheredRows(NamedRows):
             return Gathered(self._aside.pop(row, []), messages, heard_at)
 
     def take(self, data: bytes, sender: str) -> list[Part]:
-        """Take what follows out of a joined message; what is left of it, in order.
-
-        Raises:
-            MessageError: these are not the bytes of such a message.
-        """
+        """See `NamedRows.take`."""
         with self._lock:
-            return self._take(data, sender)
+            return super().take(data, sender)
 
-    def _take(self, data: bytes, sender: str) -> list[Part]:
-        known = self._number_of(sender, data)
-        if known < 0:
-            return split(data)
-        raw = np.frombuffer(data, np.uint8)
-        count, at, now = int(raw[0]) | int(raw[1]) << 8, 0, time.monotonic()
+    def _taken_of(self, data: bytes, raw: ByteArray, count: int, sender: int) -> BoolArray | None:
+        at, now = 0, time.monotonic()
         parts, state = np.zeros((4, count), np.int64), (self.state, self._gathering)
-        while 0 <= (at := _gather(raw, at, *state, known, now, parts, self._kind.times)) < count:
+        while 0 <= (at := _gather(raw, at, *state, sender, now, parts, self._kind.times)) < count:
             row, became, begin, end = parts[:, at].tolist()
             if became == _FULL and len(self._aside[row]) < MOST_ASIDE:
                 self._set_aside(row)
@@ -165,9 +153,9 @@ class GatheredRows(NamedRows):
             else:
                 self._learn(row, data[begin:end])
         if at < 0:
-            return split(data)  # which says what is wrong with it
-        taken = parts[1] == _TAKEN
-        return [] if taken.all() else left_of(data, ~taken)
+            return None
+        taken: BoolArray = parts[1] == _TAKEN
+        return taken
 
     def _suits(self, row: int, form: Form) -> bool:
         """Whether a form is of the row's source, with the columns of what the row has gathered."""

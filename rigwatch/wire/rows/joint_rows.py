@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigwatch.wire.arrays import FloatArray, IntArray
-from rigwatch.wire.bus import Part, split
+from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
 from rigwatch.wire.kernel import kernel
 from rigwatch.wire.messages import ByteArray
 from rigwatch.wire.packed_numbers import WORD
@@ -32,7 +31,6 @@ from rigwatch.wire.rows.named_rows import (
     RowState,
     following_form,
     is_whole,
-    left_of,
     lengths_of,
     row_of,
 )
@@ -85,28 +83,18 @@ class JointRows(NamedRows):
         self._messages = 0
         self._last_message = np.zeros(count, np.int64)
 
-    def take(self, data: bytes, sender: str) -> list[Part]:
-        """Take what follows out of a joined message; what is left of it, in order.
-
-        Raises:
-            MessageError: these are not the bytes of such a message.
-        """
-        known = self._number_of(sender, data)
-        if known < 0:
-            return split(data)
-        raw = np.frombuffer(data, np.uint8)
-        count = int(raw[0]) | int(raw[1]) << 8
+    def _taken_of(self, data: bytes, raw: ByteArray, count: int, sender: int) -> BoolArray | None:
         room = len(data) // WORD + 1
         out = np.empty((2, room), np.int64), np.empty(room)
         numbers = [one.view(np.uint8) for one in (*out[0], out[1])]
         parts, at = np.zeros((8, count), np.int64), 0
         self._messages += 1
         last = self._last_message, self._messages
-        while 0 <= (at := _read(raw, at, self.state, known, *last, parts, *numbers)) < count:
+        while 0 <= (at := _read(raw, at, self.state, sender, *last, parts, *numbers)) < count:
             self._learn(int(parts[0, at]), data[parts[5, at] : parts[6, at]])
         if at < 0:
-            return split(data)  # which says what is wrong with it
-        taken = parts[1] > 0
+            return None
+        taken: BoolArray = parts[1] > 0
         whole = bool(taken.all())
         if whole or taken.any():
             parts = parts if whole else np.ascontiguousarray(parts[:, taken])
@@ -114,7 +102,7 @@ class JointRows(NamedRows):
             row, n, first, at_sample, at_value, begin, end, _ = parts
             places = at_sample, at_value, begin, end
             self._batches.append(Batch(row, n, first, *places, device_us, t_ns, out[1], data))
-        return [] if whole else left_of(data, ~taken)
+        return taken
 
     def taken(self) -> list[Batch]:
         """What has been taken since the last call, in order."""

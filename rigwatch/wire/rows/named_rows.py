@@ -130,10 +130,33 @@ class NamedRows:
         if (row := self._numbers.get(rig)) is not None:
             self.state.open[row] = False
 
-    def _number_of(self, sender: str, data: bytes) -> int:
-        """That of the process that has sent a message; -1 if no row can take anything of it."""
+    def take(self, data: bytes, sender: str) -> list[Part]:
+        """Take what follows out of a joined message; what is left of it, in order.
+
+        Raises:
+            MessageError: these are not the bytes of such a message.
+        """
         known = self._senders.get(sender, -1)
-        return known if len(data) >= HEAD and self.state.open.any() else -1
+        if known < 0 or len(data) < HEAD or not self.state.open.any():
+            return split(data)
+        raw = np.frombuffer(data, np.uint8)
+        taken = self._taken_of(data, raw, int(raw[0]) | int(raw[1]) << 8, known)
+        if taken is None:
+            return split(data)  # which says what is wrong with it
+        return [] if taken.all() else _left(data, ~taken)
+
+    def _taken_of(self, data: bytes, raw: ByteArray, count: int, sender: int) -> BoolArray | None:
+        """Read what follows out of a message; which of its parts were taken.
+
+        Args:
+            data, raw: the message.
+            count: its parts.
+            sender: number of the process that has sent it.
+
+        Returns:
+            None if it is no joined message.
+        """
+        raise NotImplementedError
 
     def _learn(self, row: int, payload: bytes) -> None:
         """Keep the form of a block whose length is new, unless it is not of the row's source."""
@@ -149,7 +172,7 @@ class NamedRows:
         return source is not None and source.is_of(form)
 
 
-def left_of(data: bytes, wanted: BoolArray) -> list[Part]:
+def _left(data: bytes, wanted: BoolArray) -> list[Part]:
     """These parts of a joined message."""
     return [one for one, kept in zip(split(data), wanted.tolist(), strict=True) if kept]
 
