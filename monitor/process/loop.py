@@ -263,7 +263,7 @@ class MonitorProcess:
             and not self._operators.has_some
             and not self._models.has_some
             and not self._explainer.has_results
-            and not self.reader.has_some_alone
+            and not self.reader.may_hold()
         )
 
     @property

@@ -1,5 +1,6 @@
-"""The browser's tables show errors in the unit in which the verdict tells them."""
+"""Numbers are told with their units: the browser's tables have those of the verdict's sentence."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from rigwatch.browser.views.pages import render
 from rigwatch.workbench.compare.compare import Channel, Comparison
+from rigwatch.workbench.fit import Value, shown
 
 TURNS = np.pi / 30
 """A turn a minute [rad/s]."""
@@ -41,3 +43,13 @@ def test_the_steps_and_the_ledger_are_in_the_unit_of_the_log(state: SimpleNamesp
     assert [float(part.split('"')[0]) for part in page.split('data-value="')[1:]] == (
         pytest.approx([3, 2, 4])
     )
+
+
+@pytest.mark.parametrize(
+    ("unit", "told"),
+    [("N", "0.178 N (0.1 … 0.25)"), ("1", "0.178 (0.1 … 0.25)"), ("1/s", "0.178 1/s (0.1 … 0.25)")],
+)
+def test_a_value_without_a_unit_is_told_without_one(unit: str, told: str) -> None:
+    value = Value(0.178, unit, (0.1, 0.25))
+    assert shown(value) == told
+    assert shown(replace(value, interval=None)) == told.partition(" (")[0]

@@ -43,15 +43,22 @@ def rig_of(version: str, folder: Path) -> Path:
     return folder / "rig.toml"
 
 
+def findings(capsys: pytest.CaptureFixture[str], rig: Path, *more: str) -> list[dict[str, str]]:
+    capsys.readouterr()
+    code = main(["doctor", str(rig), "--json", *more])
+    printed = capsys.readouterr()
+    assert printed.out, (code, printed.err)
+    found: list[dict[str, str]] = json.loads(printed.out)
+    return found
+
+
 def doctor(capsys: pytest.CaptureFixture[str], rig: Path, *more: str) -> Findings:
-    main(["doctor", str(rig), "--json", *more])
-    return {item["what"]: item for item in json.loads(capsys.readouterr().out)}
+    return {item["what"]: item for item in findings(capsys, rig, *more)}
 
 
 def list_of(capsys: pytest.CaptureFixture[str], rig: Path, *more: str) -> list[str]:
     """What is said of unfinished files."""
-    main(["doctor", str(rig), "--json", *more])
-    found = json.loads(capsys.readouterr().out)
+    found = findings(capsys, rig, *more)
     return [item["text"] for item in found if item["what"] == "unfinished"]
 
 

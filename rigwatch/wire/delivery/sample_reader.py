@@ -206,11 +206,6 @@ class SampleReader:
         """The device of the last sample that was read."""
         return self._device
 
-    @property
-    def has_some_alone(self) -> bool:
-        """Whether something waits, or has come apart from the joined messages."""
-        return self._inbox.may_hold()
-
     def close_row(self) -> None:
         """Read all that comes here again."""
         self._inbox.keep_order()

@@ -7,6 +7,7 @@ who know the machine can tell.
 """
 
 import math
+from dataclasses import replace
 
 from rigwatch.wire.units import unit_of
 from rigwatch.workbench.compare.preparation import Bench
@@ -16,8 +17,8 @@ ORDER = math.sqrt(10.0)
 """Ratio of two values above which they are not of one order of magnitude, as which even a rough
 starting value is meant."""
 SAID = (
-    "{name}: fitted to {fitted}, another order of magnitude than the {given:.3g} {unit} given under"
-    " [start]; it may stand for something that the model lacks; if that value is known, set"
+    "{name}: fitted to {fitted}, another order of magnitude than the {given} given under [start];"
+    " it may stand for something that the model lacks; if that value is known, set"
     " `fixed = true` in the model's file"
 )
 
@@ -36,7 +37,8 @@ def far_from_given(bench: Bench, found: dict[str, Value]) -> list[str]:
             continue
         in_unit = unit_of(value.unit).from_si(given)
         if _of_another_order(in_unit, value.interval):
-            said.append(SAID.format(name=name, fitted=shown(value), given=in_unit, unit=value.unit))
+            told = shown(replace(value, value=in_unit, interval=None))
+            said.append(SAID.format(name=name, fitted=shown(value), given=told))
     return said
 
 

@@ -68,11 +68,12 @@ class Value:
 
 
 def shown(value: Value) -> str:
-    """A value with its unit and interval, as text."""
+    """A value with its unit, if it has one, and its interval, as text."""
+    told = f"{value.value:.3g} {value.unit}".removesuffix(" 1")
     if value.interval is None:
-        return f"{value.value:.3g} {value.unit}"
+        return told
     low, high = value.interval
-    return f"{value.value:.3g} {value.unit} ({low:.3g} … {high:.3g})"
+    return f"{told} ({low:.3g} … {high:.3g})"
 
 
 def as_written(found: Mapping[str, Value], system: System) -> dict[str, Value]:

@@ -1,6 +1,7 @@
 """Results of the workbench as plain text: tables and sentences."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from rigwatch.workbench.compare import Bases, Comparison, Region
 from rigwatch.workbench.explain import Explanation, Row
@@ -163,10 +164,7 @@ def at_its_bounds(found: Explanation) -> str:
     if found.verdict != "missing_effect" or not found.on_bound:
         return ""
     own = found.ranking[0].parameters
-    values = [
-        f"{name} ({own[name].value:.3g} {own[name].unit}".removesuffix(" 1") + ")"
-        for name in found.on_bound
-    ]
+    values = [f"{name} ({shown(replace(own[name], interval=None))})" for name in found.on_bound]
     ends = "is on a bound" if len(values) == 1 else "are on bounds"
     return f"; its {' and '.join(values)} {ends}: the recordings may ask for another shape"
 

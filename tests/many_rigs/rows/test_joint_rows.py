@@ -96,7 +96,7 @@ def test_the_lengths_of_a_busy_machine_are_learnt_once_or_twice() -> None:
     for n in rng.integers(6, 14, 400).tolist():
         assert rows.take(join([part_of(samples(0, following, n, rng))]), "daq") == []
         following += n
-    assert max(Counter(learnt).values()) <= 2, "a row keeps eight lengths"
+    assert max(Counter(learnt).values()) <= 2, "a row keeps all lengths of a busy machine"
 
 
 def flagged(block: SampleBlock) -> SampleBlock:
