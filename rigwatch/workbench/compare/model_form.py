@@ -69,7 +69,7 @@ def variances_between_bases(
     for other, strengths in zip(good, after, strict=True):
         if strengths is not None:
             group = study.model.variants[other.names[-1]].group or other.names[-1]
-            moved[group] = np.maximum(moved.get(group, 0.0), (strengths - before) ** 2)
+            moved[group] = np.fmax(moved.get(group, 0.0), (strengths - before) ** 2)
     total = np.sum([np.zeros_like(before), *moved.values()], axis=0)
     return dict(zip(fitted.compiled.system.free, total.tolist(), strict=True))
 
@@ -120,7 +120,10 @@ def _along(study: Study, names: Sequence[str]) -> Model:
 
 
 def _strengths(study: Study, data: Data, model: Model, fitted: Fitted) -> FloatArray | None:
-    """The fitted parameters with another base, shape (m,); None if they cannot be fitted."""
+    """The fitted parameters with another base, NaN of those that it lacks, shape (m,).
+
+    None if they cannot be fitted.
+    """
     prefixes = tuple(placement.prefix for placement in fitted.placements)
     start = {n: v for n, v in fitted.train.values().items() if n.startswith(prefixes)}
     other, scale = replace(study, model=model, kept=None), fitted.train.scale
@@ -128,4 +131,4 @@ def _strengths(study: Study, data: Data, model: Model, fitted: Fitted) -> FloatA
         found = values_with(other, data, fitted.placements, start, scale)
     except RigwatchError:
         return None
-    return np.array([found[name] for name in fitted.compiled.system.free])
+    return np.array([found.get(name, np.nan) for name in fitted.compiled.system.free])

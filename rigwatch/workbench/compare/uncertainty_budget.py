@@ -137,6 +137,8 @@ def _add_response_error(found: dict[str, float], placement: Placement, fitted: F
 
 def _variances(study: Study, kept: Kept, data: Data, fitted: Fitted) -> dict[str, float]:
     """Variances of the fitted parameters due to the kept ones."""
+    if not kept.names:
+        return {}
     turn = _by_kept(study, kept, data, fitted)
     variances = np.diag(turn @ kept.covariance @ turn.T)
     return dict(zip(fitted.compiled.system.free, variances.tolist(), strict=True))

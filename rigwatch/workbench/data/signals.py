@@ -50,11 +50,14 @@ class MotionSensor:
     Attributes:
         port: port of the unmodified model at which the sensor's effects enter.
         position, rate: columns of the inputs.
+        present: column of the input that is 1 where a fault of it is present; None if it is
+            everywhere.
     """
 
     port: str
     position: int
     rate: int
+    present: int | None = None
 
 
 @dataclass(frozen=True, eq=False)

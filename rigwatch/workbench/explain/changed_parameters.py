@@ -9,6 +9,7 @@ effect that is in the library leaves nothing that these parameters could explain
 
 from dataclasses import replace
 
+from rigwatch.physics.engine.fit import with_effects
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.explain.rough_verdict import SHARE
@@ -57,9 +58,10 @@ def undetermined_if_parameters_changed(bench: Bench, found: Verdict, progress: P
 def _refitted(bench: Bench) -> Fitted | None:
     """The model without the effect, its kept parameters free; None if it cannot be fitted."""
     loose = replace(bench.study, model=with_kept_free(bench.study.model))
+    data = replace(bench.data, train=with_effects(bench.study.model, bench.data.train))
     start, scale = bench.base.train.values(), bench.base.train.scale
     try:
-        return fit_model(loose, bench.data, bench.base.placements, start, scale)
+        return fit_model(loose, data, bench.base.placements, start, scale)
     except ModelError:
         return None
 

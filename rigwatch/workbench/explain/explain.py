@@ -12,8 +12,10 @@ from rigwatch.workbench.compare import (
     with_hold_decided,
 )
 from rigwatch.workbench.explain.adequacy import (
+    beside_healthy,
     cannot_tell,
     closer_base,
+    describing_healthy,
     inadequate,
     reversed_channel,
     stopped_by_outliers,
@@ -114,10 +116,29 @@ def explained(bench: Bench, progress: Progress = no_progress) -> Explained:
         progress: called with a line of text as each part begins.
     """
     adequate = with_adequate_base(bench, progress)
-    first = _explained_once(adequate, progress)
+    first = _beside_healthy(_explained_once(adequate, progress), progress)
     if adequate is bench:
         first = _on_closer_base(first, progress)
     return _with_rarer(first, progress)
+
+
+def _beside_healthy(first: Explained, progress: Progress) -> Explained:
+    """The explanation; with the healthy recording in the training if only that names an effect.
+
+    The comparison remains that of the study's own training.
+    """
+    if first.explanation.verdict not in {"undetermined", "unknown_effect"}:
+        return first
+    bench = beside_healthy(first.bench, progress)
+    if bench is None:
+        return first
+    rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
+    second = _explained_once(bench, progress, describing_healthy(bench, rows))
+    if second.explanation.verdict != "missing_effect":
+        return first
+    own, found = first.explanation.comparison, unless_two(second.explanation)
+    compared = replace(own, remarks=found.comparison.remarks)
+    return replace(second, explanation=replace(found, comparison=compared))
 
 
 def _on_closer_base(first: Explained, progress: Progress) -> Explained:

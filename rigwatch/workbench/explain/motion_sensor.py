@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigwatch.physics.engine.equations import Placement
-from rigwatch.physics.engine.fit import Recording, evaluate
+from rigwatch.physics.engine.fit import Recording, evaluate, with_effects
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
@@ -75,17 +75,19 @@ def motion_sensor_rows(bench: Bench) -> list[Ranked]:
             row = _row(Placement(name, effect, sensor.port), explained, strength)
             row.fitted = fitted
             judge_fit(bench.base, row)
-            _deny_gain(bench.data, sensor, row)
+            _deny_gain(bench, sensor, row)
             found.append(row)
     return found
 
 
-def _deny_gain(data: Data, sensor: MotionSensor, row: Ranked) -> None:
+def _deny_gain(bench: Bench, sensor: MotionSensor, row: Ranked) -> None:
     """Refuse a gain that the sensor of the motion's balance would have shown."""
-    if row.placement.name != GAIN or data.healthy is None:
+    healthy = bench.data.healthy
+    if row.placement.name != GAIN or healthy is None:
         return
     gain = row.start[row.placement.effect.strength]
-    reason = denies_gain(data.healthy, data.train, sensor.rate, gain)
+    test = with_effects(bench.study.model, bench.data.train)
+    reason = denies_gain(healthy, test, sensor.rate, gain)
     if reason:
         row.accepted, row.reason = False, reason
 
@@ -160,8 +162,9 @@ def corrected(
         part = inputs[begin : begin + length]
         x, v = part[:, sensor.position].copy(), part[:, sensor.rate].copy()
         dx, dv = direction(x, v, _times(recording, length))
-        part[:, sensor.position] -= strength * dx
-        part[:, sensor.rate] -= strength * dv
+        size = strength if sensor.present is None else strength * part[:, sensor.present]
+        part[:, sensor.position] -= size * dx
+        part[:, sensor.rate] -= size * dv
         begin += length
     return replace(recording, inputs=inputs)
 

@@ -14,7 +14,7 @@ from rigwatch.physics.engine.compile import (
     even_substeps,
     resolved,
 )
-from rigwatch.physics.engine.equations import Placement, System, compose
+from rigwatch.physics.engine.equations import PRESENT, Placement, System, compose
 from rigwatch.physics.engine.fit import (
     Fit,
     Recording,
@@ -26,6 +26,7 @@ from rigwatch.physics.engine.fit import (
     with_opening_values,
 )
 from rigwatch.physics.engine.search import (
+    STARTS,
     Convergence,
     ShortHorizons,
     WholeRuns,
@@ -258,8 +259,9 @@ def _trained(  # noqa: PLR0917 -- the arguments of `fit_model`
     search: ShortHorizons | WholeRuns | None = None
     if data.along_motion and len(compiled.system.free) >= MANY_PARAMETERS and scale is not None:
         search = WholeRuns(
-            compiled, [data.train], scale, start=begin, substeps=substeps, thorough=True
-        )
+            compiled, _in_windows(data.train, horizon), scale, start=begin, substeps=substeps,
+            thorough=True, starts=0 if PRESENT in study.model.inputs else STARTS,
+        )  # fmt: skip
     elif multi_start and not data.along_motion:
         noise = quiet_scale(data.train) if scale is None else scale
         search = ShortHorizons(
@@ -277,6 +279,14 @@ def _trained(  # noqa: PLR0917 -- the arguments of `fit_model`
         begin = fit_over(horizon // SHORTER, start=begin).parameters
     found = _settled(study, data, last_fit(horizon, start=begin, initial=first), horizon, substeps)
     return found, None, horizon
+
+
+def _in_windows(recording: Recording, horizon: int) -> list[Recording]:
+    """A recording in parts of one horizon each; itself if it is no longer."""
+    if len(recording) <= horizon:
+        return [recording]
+    ends = range(horizon, len(recording) + 1, horizon)
+    return [recording.stretch(end - horizon, end) for end in ends]
 
 
 def _compiled(

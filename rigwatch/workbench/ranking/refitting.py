@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from rigwatch.physics.engine.compile import cores, side_by_side
-from rigwatch.physics.engine.equations import Placement
+from rigwatch.physics.engine.equations import PRESENT, Placement
 from rigwatch.physics.engine.search import undetermined
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, NoiseFloor, lowered
@@ -42,7 +42,7 @@ def refit(
         fitting: `fit_model` accepts the first minimum, `fit_with_retry` also searches elsewhere.
     """
     fits, failures = list[Fitted](), list[str]()
-    ended, given = base.train.values() | row.begin(), _given_of_open(study, data, base)
+    ended, given = _ended(study, base) | row.begin(), _given_of_open(study, data, base)
     for placement in orders_at_port(study, base, row):
         placements = (*base.placements, placement)
         for start in (ended, ended | given) if given else (ended,):
@@ -58,6 +58,16 @@ def refit(
         return
     row.fitted, row.failure = min(fits, key=lambda fitted: fitted.train_error), ""
     judge_fit(base, row)
+
+
+def _ended(study: Study, base: Fitted) -> dict[str, float]:
+    """Values that the base model ended with.
+
+    Where parameters are shared with a recording without effects, they begin where that alone has
+    them: the base model's have followed what is missing in the other.
+    """
+    own = study.model.parameters if PRESENT in study.model.inputs else {}
+    return base.train.values() | {name: p.value for name, p in own.items()}
 
 
 def _given_of_open(study: Study, data: Data, base: Fitted) -> dict[str, float]:

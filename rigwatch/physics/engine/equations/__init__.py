@@ -55,6 +55,7 @@ from rigwatch.physics.engine.equations.quantities import (
 from rigwatch.physics.engine.equations.scope import symbol
 from rigwatch.physics.engine.equations.system import (
     LEFT,
+    PRESENT,
     PROBE,
     RATE,
     STEP,
@@ -73,6 +74,7 @@ from rigwatch.physics.engine.equations.variants import neighbours, with_variants
 __all__ = [
     "FUNCTIONS",
     "LEFT",
+    "PRESENT",
     "PROBE",
     "RATE",
     "STEP",

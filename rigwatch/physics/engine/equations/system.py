@@ -2,7 +2,8 @@
 
 Parameters and states of an effect are prefixed by its port and name, such as `load_coulomb_Fc`, so
 the same effect can be at two ports. Effects at a force port are added; effects at a signal port are
-applied in sequence, in the order of placement unless they are placed ahead.
+applied in sequence, in the order of placement unless they are placed ahead. A model with the input
+`PRESENT` has them only where that is 1, so that recordings with and without them share parameters.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,6 +28,8 @@ RATE = "rate"
 STEP = "step"
 """Name, for directions of effects at a signal port, of the signal's change over a sample."""
 UNTIL = "until_"
+PRESENT = "present_"
+"""Name of an input that is 1 in recordings with effects, and 0 in those without."""
 LEFT = "left"
 """Name, for effects at a signal port, of the time until a held input changes; 0 otherwise.
 
@@ -211,6 +214,7 @@ class _Composer:
         self._variables: dict[str, dict[str, sympy.Expr]] = {}
         self._updates: dict[str, sympy.Expr] = {}
         self._scope = Scope()
+        self._present = symbol(PRESENT) if PRESENT in model.inputs else sympy.Integer(1)
         self._spelt_out = spelt_out(model)
         self._waiting = list(in_order(model))
         self._scope.define(TIME, symbol(TIME), "s")
@@ -285,7 +289,7 @@ class _Composer:
         """A port with its effects, added to the scope."""
         probe = symbol(PROBE + name) if port.kind != "sensor" else sympy.Integer(0)
         self._variables[name] = self._port_variables(name, port)
-        value = self._port_value(name, port) + probe
+        value = self._port_value(name, port) + self._present * probe
         self._scope.define(name, value, self._port_unit(name, port))
         self._join(self._known())
         return value
@@ -310,9 +314,13 @@ class _Composer:
         signal = port.kind != "force"
         value = self._scope.meanings[port.signal] if signal else sympy.Integer(0)
         for placement in signal_order(self._placements, name):
-            change = self._effect_value(placement, port, value, unit)
-            value = change if signal else value + change
+            acting = self._effect_value(placement, port, value, unit)
+            value = self._where_present(value, acting if signal else value + acting)
         return value
+
+    def _where_present(self, without: sympy.Expr, acting: sympy.Expr) -> sympy.Expr:
+        """A port with an effect where it is present, and without it elsewhere."""
+        return acting if self._present == 1 else without + self._present * (acting - without)
 
     def _effect_value(
         self, placement: Placement, port: Port, arriving: sympy.Expr, unit: str

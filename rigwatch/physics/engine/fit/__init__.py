@@ -28,6 +28,7 @@ from rigwatch.physics.engine.fit.recording import (
     of_parts,
     shown_states,
     windows,
+    with_effects,
 )
 from rigwatch.physics.engine.fit.ties import untied
 from rigwatch.physics.engine.fit.windowed_fit import (
@@ -82,5 +83,6 @@ __all__ = [
     "shown_states",
     "untied",
     "windows",
+    "with_effects",
     "with_opening_values",
 ]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from rigwatch.physics.engine.equations import System
+from rigwatch.physics.engine.equations import PRESENT, Model, System
 from rigwatch.physics.engine.fit.decimation import Thinning
 from rigwatch.physics.transfer import Derivative
 from rigwatch.wire.arrays import FloatArray, IntArray
@@ -174,6 +174,14 @@ def joined(recordings: Sequence[Recording]) -> Recording:
 def apart(recording: Recording) -> list[Recording]:
     """Each of the concatenated recordings by itself; the residuals of none are thinned."""
     return [recording.stretch(own.start, own.stop) for own in recording.slices]
+
+
+def with_effects(model: Model, recording: Recording) -> Recording:
+    """The first samples of a recording, in which effects are present: all without `PRESENT`."""
+    if PRESENT not in model.inputs:
+        return recording
+    present = recording.inputs[:, list(model.inputs).index(PRESENT)] > 0.0
+    return recording.stretch(0, int(present.sum()))
 
 
 def of_parts(spacings: Sequence[float], lengths: Sequence[int]) -> tuple[float, tuple[float, ...]]:

@@ -25,7 +25,7 @@ from rigwatch.physics.engine.compile import (
 )
 from rigwatch.physics.engine.equations import PROBE, System, hold_at, parse, symbol
 from rigwatch.physics.engine.score.candidates import Candidate, root_mean_square
-from rigwatch.physics.engine.score.trajectory import Trajectory, memory, port_signals
+from rigwatch.physics.engine.score.trajectory import Trajectory, memory, port_signals, presence
 from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
 from rigwatch.wire.kernel import kernel
 
@@ -49,7 +49,7 @@ def directions(at: Trajectory, candidates: Sequence[Candidate]) -> FloatArray:
         )
         found[..., places] = _propagated(run, len(system.free), pushes, columns, held)
     outer = [i for i, c in enumerate(candidates) if kinds[c.port] == "sensor"]
-    pushes = _pushes(at, [candidates[index] for index in outer], seen)
+    pushes = _pushes(at, [candidates[index] for index in outer], seen) * presence(at)
     for index, push in zip(outer, pushes, strict=True):
         signal = list(system.outputs).index(system.model.ports[candidates[index].port].signal)
         found[..., signal, index] = push[:, :: run.substeps]

@@ -14,7 +14,7 @@ import numpy as np
 from rigwatch.physics.engine.compile import numpy_function
 from rigwatch.physics.engine.equations import parse, symbol
 from rigwatch.physics.engine.score.candidates import Candidate
-from rigwatch.physics.engine.score.trajectory import Trajectory, memory, port_signals
+from rigwatch.physics.engine.score.trajectory import Trajectory, memory, port_signals, presence
 from rigwatch.wire.arrays import FloatArray
 
 
@@ -37,7 +37,8 @@ def finite_effect(
     def added(values: Mapping[str, float]) -> FloatArray:
         known = {**signals, **(states(values) if states else {}), **values}
         found = function(*(known[name] for name in names))
-        return np.broadcast_to(np.asarray(found, np.float64) - without, at.time.shape)
+        change = (np.asarray(found, np.float64) - without) * presence(at)
+        return np.broadcast_to(change, at.time.shape)
 
     return added
 

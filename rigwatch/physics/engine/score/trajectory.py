@@ -11,6 +11,7 @@ import sympy
 from rigwatch.physics.engine.compile import CompiledSystem, Linearisation, numpy_function
 from rigwatch.physics.engine.equations import (
     LEFT,
+    PRESENT,
     RATE,
     STEP,
     TIME,
@@ -111,6 +112,12 @@ def port_signals(at: Trajectory, port_name: str) -> dict[str, FloatArray]:
         held = port.kind == "sensor" or hold_at(system.model, port) == "zero"
         signals[LEFT] = held * _left(at)
     return signals
+
+
+def presence(at: Trajectory) -> FloatArray | float:
+    """Where effects are present, at the nodes, shape (windows, nodes); 1 if they are everywhere."""
+    inputs = list(at.compiled.system.model.inputs)
+    return at.inputs[..., inputs.index(PRESENT)] if PRESENT in inputs else 1.0
 
 
 def _step(signal: FloatArray, substeps: int) -> FloatArray:

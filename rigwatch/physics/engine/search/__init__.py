@@ -19,9 +19,10 @@ from rigwatch.physics.engine.search.hidden_states import continued_spread, has_h
 from rigwatch.physics.engine.search.multi_start_fit import multi_start_fit
 from rigwatch.physics.engine.search.promised_step import kept_promise
 from rigwatch.physics.engine.search.short_horizons import ShortHorizons
-from rigwatch.physics.engine.search.whole_runs import WholeRuns
+from rigwatch.physics.engine.search.whole_runs import STARTS, WholeRuns
 
 __all__ = [
+    "STARTS",
     "Convergence",
     "ShortHorizons",
     "WholeRuns",
