@@ -7,6 +7,7 @@ In order: signals on one time grid, holds of the inputs, results from the health
 from dataclasses import dataclass, replace
 
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.workbench.compare.beside_healthy import may_share, shared, was_accepted_so
 from rigwatch.workbench.compare.horizon import with_horizon
 from rigwatch.workbench.compare.row_order import with_row_order
 from rigwatch.workbench.data import (
@@ -118,10 +119,29 @@ def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench
         bare = fit_model(study, healthy, (), study.file.start, base.train.scale, multi_start=True)
         floor = _of_healthy(study, data, healthy, base, bare)
     bench = Bench(study, data, base, floor, bare)
+    if was_accepted_so(study) and may_share(study, data):
+        return beside_healthy(bench)
     # An accepted fit was begun where the model without its effect had ended.
     if keeps_accepted(study) and not only_noise_left(floor, base):
         return with_base(bench, begun_from_given(study, data, base))
     return bench
+
+
+def beside_healthy(bench: Bench) -> Bench:
+    """The bench with the healthy recording in its training, see `beside_healthy.py`.
+
+    Args:
+        bench: of a study that `may_share`.
+
+    Raises:
+        ModelError: the model cannot be fitted.
+    """
+    study, data = shared(bench.study, bench.data)
+    healthy, scale = data.of_healthy, bench.base.train.scale
+    assert healthy is not None
+    base = fit_base(study, data, scale)
+    bare = fit_model(study, healthy, (), {}, scale, multi_start=True)
+    return Bench(study, data, base, bench.floor, bare)
 
 
 def with_base(bench: Bench, base: Fitted) -> Bench:

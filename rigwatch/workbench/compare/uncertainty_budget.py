@@ -20,7 +20,7 @@ response to an effect is itself in error by a share of it. A residual that repea
 excitation is counted once, and not once per period. And a law that is not the machine's gives one
 strength for slow and another for fast motion (`regimes.py`); what the base model leaves on the
 healthy recording also varies so, but averages out over the regimes. Laws of the base that the
-healthy recording leaves open give a strength each (`model_form.py`). The contributions are
+healthy recording leaves open give a strength each (`bases/model_form.py`). The contributions are
 independent and add in quadrature (JCGM 100:2008 (GUM), 5.1).
 """
 
@@ -35,7 +35,7 @@ from rigwatch.physics.engine.fit import Fit, evaluate
 from rigwatch.physics.engine.score import Candidate
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.compare.model_form import variances_between_bases
+from rigwatch.workbench.compare.bases import variances_between_bases
 from rigwatch.workbench.compare.regimes import REGIMES, WITHIN, variances_between_regimes
 from rigwatch.workbench.data import Data, repeat_along_motion, repeat_of
 from rigwatch.workbench.fit import Fitted, block_numbers, covariance, with_kept_free

@@ -4,18 +4,21 @@ from dataclasses import dataclass, replace
 
 from msgspec import structs
 
+from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import (
     Bench,
     Decided,
+    beside_healthy,
+    describing_healthy,
+    fitted_beside_healthy,
+    may_share,
     open_bench,
     with_base,
     with_hold_decided,
 )
 from rigwatch.workbench.explain.adequacy import (
-    beside_healthy,
     cannot_tell,
     closer_base,
-    describing_healthy,
     inadequate,
     reversed_channel,
     stopped_by_outliers,
@@ -127,13 +130,19 @@ def _beside_healthy(first: Explained, progress: Progress) -> Explained:
 
     The comparison remains that of the study's own training.
     """
-    if first.explanation.verdict not in {"undetermined", "unknown_effect"}:
+    asked = first.explanation.verdict in {"undetermined", "unknown_effect"}
+    study, data = first.bench.study, first.bench.data
+    if not asked or study.file.effects or not may_share(study, data):
         return first
-    bench = beside_healthy(first.bench, progress)
-    if bench is None:
+    progress("fitting what the healthy recording leaves open to it and the training together")
+    try:
+        bench = beside_healthy(first.bench)
+    except ModelError:
         return first
+    assert bench.bare is not None
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
-    second = _explained_once(bench, progress, describing_healthy(bench, rows))
+    rows = describing_healthy(bench.study, bench.data, bench.bare.train, rows)
+    second = _explained_once(bench, progress, rows)
     if second.explanation.verdict != "missing_effect":
         return first
     own, found = first.explanation.comparison, unless_two(second.explanation)
@@ -299,13 +308,39 @@ def _explained_once(
     healthy = bench.data.healthy is not None
     if verdict.word in STRENGTH_TOLD and bench.data.along_motion and healthy:
         progress("finding what the healthy recording leaves open of the strength")
-    found = explanation(bench, rows, verdict)
+    fitted_in, rows, verdict = _with_closer_strength(bench, rows, verdict)
+    found = explanation(bench, rows, verdict, fitted_in)
     if not (bench.study.file.effects and _asks_for_exchange(bench, verdict)):
         return Explained(bench, rows, found)
     offer = first.offer if first is not None and first.sought else exchange(bench, progress)
     return Explained(
         bench, rows, _with_exchange(bench, found, verdict, offer), sought=True, offer=offer
     )
+
+
+def _with_closer_strength(
+    bench: Bench, rows: list[Ranked], verdict: Verdict
+) -> tuple[Bench, list[Ranked], Verdict]:
+    """Ranking and verdict, with the effect named as it is beside the healthy recording.
+
+    Kept at a wrong one of the points that describe a healthy rig, the model leaves more than noise
+    even of the right effect, whose strength is then off. Returns the bench of its fit as well.
+    """
+    best = verdict.best
+    alone = verdict.word == "missing_effect" and not (verdict.beside or verdict.second)
+    if not alone or best is None or best.fitted is None or bench.study.file.effects:
+        return bench, rows, verdict
+    if bench.floor.reached(best.fitted.held_out):
+        return bench, rows, verdict
+    closer = fitted_beside_healthy(bench, best)
+    if closer is None:
+        return bench, rows, verdict
+    both, row = closer
+    assert row.fitted is not None
+    unit, left = bench.base.told_in, told(row.held_out_error, bench.base.told_in)
+    text = f"{verdict.text}; with parameters from it and the healthy recording to {left:.3g} {unit}"
+    rows = [row if each is best else each for each in rows]
+    return both, rows, replace(verdict, best=row, text=text)
 
 
 def _asks_for_exchange(bench: Bench, verdict: Verdict) -> bool:

@@ -110,10 +110,19 @@ class Explanation:
     on_bound: list[str] = field(default_factory=list)
 
 
-def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanation:
-    """Converts a ranking and a verdict to the result shown to users and programs."""
+def explanation(
+    bench: Bench, rows: list[Ranked], verdict: Verdict, fitted_in: Bench | None = None
+) -> Explanation:
+    """Converts a ranking and a verdict to the result shown to users and programs.
+
+    Args:
+        bench: the study.
+        rows: its ranking.
+        verdict: on it.
+        fitted_in: the bench in which the effect named is fitted; None if it is the study's.
+    """
     members = [*verdict.members, *verdict.rivals]
-    more, told = _of_the_strength(bench, verdict)
+    more, told = _of_the_strength(fitted_in or bench, verdict)
     told += _assumed(bench.study) if verdict.word in UNEXPLAINED else []
     told += ends_of_range(bench)
     compared = comparison(bench)

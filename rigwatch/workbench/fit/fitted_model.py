@@ -345,7 +345,9 @@ def _judged(  # noqa: PLR0917 -- they belong together
     ended: Convergence | None,
 ) -> Fitted:
     """A fit with its held-out error."""
-    length = data.horizon if study.model.states else len(data.held_out)
+    # Along the motion a recording is one run; only the training may be cut, see `_in_windows`.
+    windowed = study.model.states and not data.along_motion
+    length = data.horizon if windowed else len(data.held_out)
     substeps = study.file.substeps
     found = with_opening_values(found, study.model, data.openings, data.horizon, substeps)
     judging = _may_continue(study, data)

@@ -17,7 +17,7 @@ from msgspec import structs
 from rigwatch.physics.engine.equations import Placement
 from rigwatch.physics.engine.score import suits
 from rigwatch.wire.errors import ModelError, nearest
-from rigwatch.workbench.compare import Bench, Comparison, Warm
+from rigwatch.workbench.compare import Bench, Comparison, Warm, fitted_beside_healthy
 from rigwatch.workbench.explain import SetGain, set_gain
 from rigwatch.workbench.fit import error_text, fit_model
 from rigwatch.workbench.ranking import (
@@ -368,6 +368,8 @@ def _tried(bench: Bench, effect: str, port: str) -> Ranked:
     refit_nested(bench.study, bench.data, bench.base, [row])
     if row.fitted is None:
         raise ModelError(f"{row.label}: cannot be fitted: {row.failure}")
-    if not leaves_only_noise(bench.study, bench.data, bench.floor, row):
-        refit_from_given(bench.study, bench.data, bench.base, row)
-    return row
+    if leaves_only_noise(bench.study, bench.data, bench.floor, row):
+        return row
+    refit_from_given(bench.study, bench.data, bench.base, row)
+    shared = fitted_beside_healthy(bench, row)
+    return row if shared is None else shared[1]

@@ -11,7 +11,7 @@ import pytest
 from rigwatch.physics.engine.equations import Placement
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import parse_model
-from rigwatch.workbench.compare.model_form import variances_between_bases
+from rigwatch.workbench.compare.bases.model_form import variances_between_bases
 from rigwatch.workbench.compare.preparation import bench_of, determined_by_healthy
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.fit.fitted_model import fit_model

@@ -8,8 +8,8 @@ import numpy as np
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import parse_model
 from rigwatch.physics.engine.fit import Recording
-from rigwatch.workbench.compare.base_fit import Tried
-from rigwatch.workbench.compare.base_step import BaseSearch
+from rigwatch.workbench.compare.bases.base_fit import Tried
+from rigwatch.workbench.compare.bases.base_step import BaseSearch
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.ranking import no_progress
 from rigwatch.workbench.study.study import Study

@@ -1,11 +1,10 @@
 """Whether the model is fit to judge effects, and what to look at if it is not.
 
-adequate.py       the model on a healthy recording, other bases, outliers
-beside_healthy.py parameters that the healthy recording alone leaves open
-ends_of_range.py  readings at the end of a sensor's range
-excitation.py     parameters that the training recordings do not excite
-failing_fit.py    where a model fails whose fit did not converge
-sign.py           a channel that is counted the other way
+adequate.py      the model on a healthy recording, other bases, outliers
+ends_of_range.py readings at the end of a sensor's range
+excitation.py    parameters that the training recordings do not excite
+failing_fit.py   where a model fails whose fit did not converge
+sign.py          a channel that is counted the other way
 """
 
 from rigwatch.workbench.explain.adequacy.adequate import (
@@ -19,10 +18,6 @@ from rigwatch.workbench.explain.adequacy.adequate import (
     with_base_offered,
     with_change_told,
 )
-from rigwatch.workbench.explain.adequacy.beside_healthy import (
-    beside_healthy,
-    describing_healthy,
-)
 from rigwatch.workbench.explain.adequacy.ends_of_range import ends_of_range
 from rigwatch.workbench.explain.adequacy.excitation import (
     cannot_tell,
@@ -34,10 +29,8 @@ from rigwatch.workbench.explain.adequacy.sign import reversed_channel
 
 __all__ = [
     "SHORT",
-    "beside_healthy",
     "cannot_tell",
     "closer_base",
-    "describing_healthy",
     "ends_of_range",
     "inadequate",
     "reversed_channel",

@@ -11,7 +11,7 @@ from msgspec import structs
 
 from rigwatch.physics.engine.equations import RATE, TIME, Effect, Placement, names_in, neighbours
 from rigwatch.physics.engine.fit import beginning, evaluate
-from rigwatch.workbench.compare.base_fit import PART, Tried
+from rigwatch.workbench.compare.bases.base_fit import PART, Tried
 from rigwatch.workbench.data import Data
 from rigwatch.workbench.ranking import Ranked, candidates, scored
 from rigwatch.workbench.study import Element, Study, elements_of, varied, written_variants

@@ -18,13 +18,10 @@ import numpy as np
 from msgspec import structs
 
 from rigwatch.physics.engine.equations import PRESENT, Input, Model
-from rigwatch.physics.engine.fit import Recording, apart, joined, with_effects
-from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.compare import Bench
+from rigwatch.physics.engine.fit import Fit, Recording, apart, joined, with_effects
 from rigwatch.workbench.data import Data
-from rigwatch.workbench.fit import Fitted, fit_base, fit_model, with_kept_free
-from rigwatch.workbench.ranking import Progress, Ranked
+from rigwatch.workbench.fit import with_kept_free
+from rigwatch.workbench.ranking import Ranked
 from rigwatch.workbench.study import Kept, Study
 
 AS_BEFORE = 1.05
@@ -37,55 +34,54 @@ TOLD = (
 REFUSED = "the healthy recording is no longer described with it"
 
 
-def beside_healthy(bench: Bench, progress: Progress) -> Bench | None:
-    """The bench with the healthy recording in its training; None if it does not suit the study.
-
-    Args:
-        bench: a study without accepted effects, along its measured motion.
-        progress: called with a line of text as the fits begin.
-    """
-    if not _is_suited(bench):
-        return None
-    progress("fitting what the healthy recording leaves open to it and the training together")
-    study, data = _open(bench.study), _together(bench.study.model, bench.data)
-    scale = bench.base.train.scale
-    healthy = data.of_healthy
-    assert healthy is not None
-    try:
-        base = fit_base(study, data, scale)
-        bare = fit_model(study, healthy, (), {}, scale, multi_start=True)
-    except ModelError:
-        return None
-    return Bench(study, data, base, bench.floor, bare)
-
-
-def describing_healthy(bench: Bench, rows: Sequence[Ranked]) -> list[Ranked]:
-    """The rows of a bench of `beside_healthy`; those that spoil its healthy part are refused."""
-    assert bench.bare is not None
-    most = AS_BEFORE * _size(bench.bare.train.residuals, bench.bare)
-    for row in rows:
-        if row.accepted and row.fitted is not None and _healthy_error(bench, row.fitted) > most:
-            row.accepted, row.reason = False, REFUSED
-    return list(rows)
-
-
-def _is_suited(bench: Bench) -> bool:
-    """Whether parameters are kept from a healthy recording that the model runs along."""
-    study, data = bench.study, bench.data
-    if study.kept is None or bench.bare is None or data.healthy is None:
+def may_share(study: Study, data: Data) -> bool:
+    """Whether a study keeps parameters from a healthy recording that its model runs along."""
+    if study.kept is None or data.healthy is None or is_shared(study):
         return False
-    simple = not (study.file.effects or study.model.rough or study.moving())
-    return data.along_motion and simple and data.train.thinning is None
+    simple = not (study.model.rough or study.moving()) and data.train.thinning is None
+    return data.along_motion and simple
 
 
-def _open(study: Study) -> Study:
-    """The study with its kept parameters free, and effects that may be absent."""
+def is_shared(study: Study) -> bool:
+    """Whether the training holds the healthy recording."""
+    return PRESENT in study.model.inputs
+
+
+def was_accepted_so(study: Study) -> bool:
+    """Whether the last effect was accepted with parameters from both recordings.
+
+    Then they are kept with it: those from the healthy recording alone never are.
+    """
+    kept = {name for name, p in study.model.parameters.items() if p.kept}
+    return bool(study.file.effects) and not kept.isdisjoint(study.file.effects[-1].model)
+
+
+def shared(study: Study, data: Data) -> tuple[Study, Data]:
+    """A study that `may_share`, its kept parameters free, with both recordings in the training."""
     known = tuple(name for name, p in study.model.parameters.items() if p.fixed and p.deviation)
     deviations = np.array([study.model.parameters[name].deviation for name in known])
     free = with_kept_free(study.model)
     presence = Input(unit="1", hold="linear", constant=True)
     model = structs.replace(free, inputs=free.inputs | {PRESENT: presence})
-    return replace(study, model=model, kept=Kept(known, np.diag(deviations**2)))
+    kept = Kept(known, np.diag(deviations**2))
+    return replace(study, model=model, kept=kept), _together(study.model, data)
+
+
+def describing_healthy(
+    study: Study, data: Data, alone: Fit, rows: Sequence[Ranked]
+) -> list[Ranked]:
+    """The rows of a study that is shared; those that spoil its healthy part are refused.
+
+    Args:
+        study, data: from `shared`.
+        alone: the model fitted to the healthy recording.
+        rows: of its ranking.
+    """
+    first, most = len(with_effects(study.model, data.train)), AS_BEFORE * _size(alone, 0)
+    for row in rows:
+        if row.accepted and row.fitted is not None and _size(row.fitted.train, first) > most:
+            row.accepted, row.reason = False, REFUSED
+    return list(rows)
 
 
 def _together(model: Model, data: Data) -> Data:
@@ -116,12 +112,7 @@ def _with_presence(recording: Recording, present: float) -> Recording:
     return replace(recording, inputs=np.hstack([recording.inputs, column]), driving=driving)
 
 
-def _healthy_error(bench: Bench, fitted: Fitted) -> float:
-    """Error of the healthy part of the training, in standard deviations of noise."""
-    first = len(with_effects(bench.study.model, bench.data.train))
-    residuals = fitted.train.residuals
-    return _size(residuals.reshape(-1, residuals.shape[-1])[first:], fitted)
-
-
-def _size(residuals: FloatArray, fitted: Fitted) -> float:
-    return float(np.sqrt(np.nanmean((residuals / fitted.train.scale) ** 2)))
+def _size(fit: Fit, first: int) -> float:
+    """Error from a sample on, in standard deviations of noise."""
+    residuals = fit.residuals.reshape(-1, fit.residuals.shape[-1])[first:]
+    return float(np.sqrt(np.nanmean((residuals / fit.scale) ** 2)))

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from rigwatch.physics.engine.equations import check_variants
 from rigwatch.physics.engine.fit import Recording
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.compare.base_fit import Base
-from rigwatch.workbench.compare.base_step import AT_NOISE, BaseSearch, improves
+from rigwatch.workbench.compare.bases.base_fit import Base
+from rigwatch.workbench.compare.bases.base_step import AT_NOISE, BaseSearch, improves
 from rigwatch.workbench.data import Data, predicts_along_motion, prepare
 from rigwatch.workbench.ranking import Progress, no_progress
 from rigwatch.workbench.study import Study, check_data, varied

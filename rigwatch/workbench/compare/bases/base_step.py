@@ -8,7 +8,7 @@ import numpy as np
 from rigwatch.physics.engine.compile import side_by_side
 from rigwatch.physics.engine.fit import Fit
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.compare.base_fit import (
+from rigwatch.workbench.compare.bases.base_fit import (
     Brief,
     Tried,
     brief_fit,
@@ -16,7 +16,7 @@ from rigwatch.workbench.compare.base_fit import (
     judged,
     shared_values,
 )
-from rigwatch.workbench.compare.base_neighbours import further_elements, further_variants
+from rigwatch.workbench.compare.bases.base_neighbours import further_elements, further_variants
 from rigwatch.workbench.data import Data, predicts_along_motion
 from rigwatch.workbench.ranking import STEP, Progress, difference
 from rigwatch.workbench.study import Study

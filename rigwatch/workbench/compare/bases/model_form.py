@@ -26,8 +26,8 @@ from rigwatch.physics.engine.fit import Recording, beginning
 from rigwatch.physics.engine.search import WholeRuns
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.workbench.compare.base_fit import PART
-from rigwatch.workbench.compare.base_neighbours import with_one_variant_more
+from rigwatch.workbench.compare.bases.base_fit import PART
+from rigwatch.workbench.compare.bases.base_neighbours import with_one_variant_more
 from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit import Fitted, values_with, with_kept_free, with_values
 from rigwatch.workbench.study import Study, varied
