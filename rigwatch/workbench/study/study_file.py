@@ -53,7 +53,10 @@ class Accepted(Section, frozen=True, kw_only=True):
     ] = field(default_factory=dict)
     model: Annotated[
         dict[str, float],
-        Meta(description="initial values of the rest of the model, from its accepted fit"),
+        Meta(
+            description="initial values of the rest of the model, from its accepted fit; with kept"
+            " parameters among them, these are shared with the healthy recording"
+        ),
     ] = field(default_factory=dict)
     ahead: Annotated[
         bool,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rigwatch.wire.kernel import kernel
-from rigwatch.workbench.compare import Bench, beside_healthy, may_share, open_bench
+from rigwatch.workbench.compare import Bench, beside_healthy, locate, may_share, open_bench
 from rigwatch.workbench.explain.explain import _explained_once, explained
 from rigwatch.workbench.explain.explanation import Explanation
 from rigwatch.workbench.ranking import no_progress
@@ -171,6 +171,8 @@ def test_the_effect_is_added_as_it_was_named_and_then_nothing_is_missing(tmp_pat
     again = open_bench(open_study(study))
     assert again.base.train.values()["k"] == pytest.approx(100.0, rel=0.02)
     assert explained(with_few_effects(again)).explanation.verdict == "nothing_missing"
+    times = {region.name.split(",")[0] for region in locate(again) if region.view == "time"}
+    assert times == {"../train0.mcap", "../healthy.mcap"}
 
 
 def test_an_effect_that_makes_the_healthy_recording_its_own_is_not_added_so(tmp_path: Path) -> None:

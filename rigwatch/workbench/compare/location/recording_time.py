@@ -3,6 +3,7 @@
 import numpy as np
 
 from rigwatch.wire.arrays import FloatArray, IntArray
+from rigwatch.workbench.compare.beside_healthy import is_shared
 from rigwatch.workbench.compare.preparation import Bench
 from rigwatch.workbench.study import Span
 
@@ -37,5 +38,6 @@ def recording_time(bench: Bench, rows: IntArray) -> tuple[IntArray, FloatArray]:
 
 def _span(bench: Bench, at: int) -> Span | None:
     """The section of a training recording in the study; None if they are in memory alone."""
-    spans = bench.study.file.train
+    file = bench.study.file
+    spans = (*file.train, *file.healthy) if is_shared(bench.study) else file.train
     return spans[at] if len(spans) == len(bench.data.train.slices) else None
