@@ -60,6 +60,7 @@ from rigwatch.wire.host import (
     Heartbeat,
     Kept,
     both_clocks,
+    keep_large_pieces_apart,
     prepare_for_real_time,
     raise_priority,
     set_at_signal,
@@ -633,6 +634,7 @@ def run(path: Path | str) -> int:
         RigwatchError: configuration, model, journal or bus are invalid or unavailable.
     """
     stop = set_at_signal()
+    keep_large_pieces_apart()
     config = load_rig(path)
     # Before joining: a monitor that is visible there is ready.
     model = unless_ended(stop, lambda: prepared(config, path))

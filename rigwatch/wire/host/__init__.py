@@ -4,6 +4,7 @@ from rigwatch.wire.host.both_clocks import both_clocks
 from rigwatch.wire.host.disk_space import free_share
 from rigwatch.wire.host.ending import set_at_hangup, set_at_signal, unless_ended
 from rigwatch.wire.host.few_pools import (
+    keep_large_pieces_apart,
     keep_memory_tidy,
     settle_memory,
     tidy_memory,
@@ -62,6 +63,7 @@ __all__ = [
     "free_ports",
     "free_share",
     "is_free",
+    "keep_large_pieces_apart",
     "keep_memory_tidy",
     "last_line",
     "may_be_file",

@@ -57,14 +57,21 @@ _NO_GLIBC = (AttributeError, OSError, TypeError)
 
 def use_few_pools() -> None:
     """Set this up before threads are started; without effect where the library is not glibc."""
+    _set(_ARENA_MAX, POOLS)
+    keep_large_pieces_apart()
+
+
+def keep_large_pieces_apart() -> None:
+    """Give large pieces pages of their own, whatever was freed before; all of `use_few_pools` for a
+    process whose threads must not wait for each other's memory.
+    """
+    _set(_MMAP_THRESHOLD, LARGE)
+    _set(_TRIM_THRESHOLD, LARGE)
+
+
+def _set(option: int, value: int) -> None:
     with contextlib.suppress(*_NO_GLIBC):
-        mallopt = ctypes.CDLL(None).mallopt
-        for option, value in (
-            (_ARENA_MAX, POOLS),
-            (_MMAP_THRESHOLD, LARGE),
-            (_TRIM_THRESHOLD, LARGE),
-        ):
-            mallopt(option, value)
+        ctypes.CDLL(None).mallopt(option, value)
 
 
 def settle_memory() -> None:
