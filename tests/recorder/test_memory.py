@@ -293,6 +293,37 @@ def test_arrays_of_new_lengths_find_what_numpy_keeps() -> None:
     assert grown_kb < 50
 
 
+SLABS_OF_A_MONITOR = """
+import ctypes, sys
+from monitor.process import loop
+from rigwatch.wire.bus.slabs import SLAB
+
+class Pools(ctypes.Structure):
+    names = "arena", "free", "fast", "maps", "mapped", "most", "held", "used", "unused", "top"
+    _fields_ = [(name, ctypes.c_size_t) for name in names]
+
+library = ctypes.CDLL(None)
+library.mallinfo2.restype = Pools
+
+def look(*_):
+    before, large = library.mallinfo2().mapped, bytes(64 * SLAB)
+    del large
+    slabs = [bytearray(SLAB) for _ in range(8)]
+    print((library.mallinfo2().mapped - before) // SLAB, len(slabs) - 8)
+    sys.exit()
+
+loop.joined, loop.prepared = look, lambda *_: None
+loop.run(sys.argv[1])
+"""
+
+
+@on_linux
+def test_slabs_of_a_monitor_have_pages_of_their_own_after_larger_pieces(tmp_path: Path) -> None:
+    with TestRig(tmp_path) as rig:
+        apart, _ = numbers_from(SLABS_OF_A_MONITOR, str(rig.path))
+    assert apart >= 8
+
+
 @pytest.mark.parametrize(
     "process",
     [
