@@ -147,7 +147,7 @@ def _beside_healthy(first: Explained, progress: Progress) -> Explained:
         return first
     own, found = first.explanation.comparison, unless_two(second.explanation)
     compared = replace(own, remarks=found.comparison.remarks)
-    return replace(second, explanation=replace(found, comparison=compared))
+    return replace(second, bench=first.bench, explanation=replace(found, comparison=compared))
 
 
 def _on_closer_base(first: Explained, progress: Progress) -> Explained:
@@ -338,7 +338,7 @@ def _with_closer_strength(
     both, row = closer
     assert row.fitted is not None
     unit, left = bench.base.told_in, told(row.held_out_error, bench.base.told_in)
-    text = f"{verdict.text}; with parameters from it and the healthy recording to {left:.3g} {unit}"
+    text = f"{verdict.text}; with the healthy recording in the training to {left:.3g} {unit}"
     rows = [row if each is best else each for each in rows]
     return both, rows, replace(verdict, best=row, text=text)
 

@@ -114,7 +114,7 @@ def test_a_strength_is_right_although_the_healthy_recording_leaves_the_model_ope
     assert k.value == pytest.approx(60.0, rel=0.02)
     low, high = k.interval
     assert 55.0 < low < 60.0 < high < 65.0
-    assert "with parameters from it and the healthy recording to 0.131 m/s^2" in found.text
+    assert "with the healthy recording in the training to 0.131 m/s^2" in found.text
 
 
 def test_what_makes_the_healthy_recording_its_own_is_no_rival(tmp_path: Path) -> None:
