@@ -120,6 +120,7 @@ def test_the_address_brings_the_token_once_and_leaves_it_out_of_what_others_see(
     assert answer.headers["referrer-policy"] == "no-referrer"
 
 
+@pytest.mark.nightly
 def test_a_test_that_fails_leaves_no_requests_to_the_next(page: Page, root: Path) -> None:
     with pytest.raises(ZeroDivisionError), serving(root) as other, looking(page.driver, other):
         raise ZeroDivisionError
@@ -166,6 +167,7 @@ def bring(served: Served, name: str) -> None:
     assert ask(served, f"/api/upload/{name}", "PUT", body=LOG)[0] == 200
 
 
+@pytest.mark.nightly
 def test_uploads_of_a_killed_server_go_with_the_next_start(tmp_path: Path) -> None:
     with serving(tmp_path) as first:
         bring(first, "a.csv")

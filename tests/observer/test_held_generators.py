@@ -97,6 +97,7 @@ def test_friction_beside_a_constant_lateness_is_noticed_as_soon(late: float) -> 
     assert times["dry_friction"] < 7.2
 
 
+@pytest.mark.nightly
 def test_commissioning_takes_held_readings_as_they_are() -> None:
     drives = (("chirp", "sweep", sweep, 14.0), ("healthy", "sine", sine, 10.0),
               ("healthy", "slower", slower, 10.0))  # fmt: skip

@@ -345,8 +345,8 @@ def _judged(  # noqa: PLR0917 -- they belong together
     ended: Convergence | None,
 ) -> Fitted:
     """A fit with its held-out error."""
-    # Along the motion a recording is one run; only the training may be cut, see `_in_windows`.
-    windowed = study.model.states and not data.along_motion
+    # Of a training that is shared with a healthy recording the windows are its parts.
+    windowed = study.model.states and PRESENT not in study.model.inputs
     length = data.horizon if windowed else len(data.held_out)
     substeps = study.file.substeps
     found = with_opening_values(found, study.model, data.openings, data.horizon, substeps)

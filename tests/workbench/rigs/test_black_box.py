@@ -77,6 +77,7 @@ def test_two_faults_at_once_are_named_whichever_is_found_first(tmp_path):
     assert verdict.word in {"missing_effect", "undetermined"}
 
 
+@pytest.mark.nightly
 def test_an_effect_that_cannot_vanish_does_not_raise_the_floor(tmp_path):
     record(tmp_path, "healthy", 1)
     record(tmp_path, "rig", 2, actuator_delay=0.001)

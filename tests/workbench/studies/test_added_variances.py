@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.compare.uncertainty_budget import RESPONSE_ERROR, added_variances
@@ -30,6 +31,7 @@ session = "healthy.mcap"
 DRAG = 0.1
 
 
+@pytest.mark.nightly
 def test_what_is_named_has_an_interval_that_is_wider_than_its_recording_says(tmp_path: Path):
     record(tmp_path, "healthy", 1)
     record(tmp_path, "rig", 2, viscous=DRAG)

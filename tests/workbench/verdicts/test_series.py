@@ -52,6 +52,7 @@ def test_without_the_composite_none_of_its_parts_is_named() -> None:
     assert verdict(COMPOSITE, whole_library=False).word == "unknown_effect"
 
 
+@pytest.mark.nightly
 def test_dry_friction_alone_is_not_called_a_slider_behind_a_gap() -> None:
     force = multisine(np.arange(0.2, 6.0, 0.2), 3.0)
     bench = opened(force, "coulomb")
