@@ -17,7 +17,7 @@ NAMES = ("voltage", "position", "acceleration")
 FRICTION_FROM = 10.0
 
 pytestmark = [
-    pytest.mark.long,
+    pytest.mark.nightly,
     pytest.mark.skipif(not FOLDER.is_dir(), reason="RIGWATCH_DATA holds no foreign_rig"),
 ]
 

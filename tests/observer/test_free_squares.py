@@ -12,7 +12,7 @@ from sim_plant.excitation import Periodic, Square
 from tests.monitor.observed_rig import FAULTS, RATE, coulomb, healthy_recordings, raised, run
 from tests.monitor.observed_rig import watched as watched_by
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.nightly
 
 SQUARE = Square(amplitude=1.2, frequency=8.0)
 
