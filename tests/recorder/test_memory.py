@@ -266,10 +266,8 @@ def test_pages_between_what_is_kept_are_given_back() -> None:
     assert kept_kb < most_kb / 4
 
 
-ARRAYS_OF_ALL_LENGTHS = """
+ACCOUNT = """
 import ctypes
-import numpy as np
-from rigwatch.wire.host import settle_memory
 
 class Pools(ctypes.Structure):
     names = "arena", "free", "fast", "maps", "mapped", "most", "held", "used", "unused", "top"
@@ -277,6 +275,14 @@ class Pools(ctypes.Structure):
 
 library = ctypes.CDLL(None)
 library.mallinfo2.restype = Pools
+"""
+"""What the C library says of its memory, as `library.mallinfo2()` of a program that begins so."""
+
+
+ARRAYS_OF_ALL_LENGTHS = f"""{ACCOUNT}
+import numpy as np
+from rigwatch.wire.host import settle_memory
+
 settle_memory()
 before = library.mallinfo2().used
 for length in range(1, 128):
@@ -293,23 +299,16 @@ def test_arrays_of_new_lengths_find_what_numpy_keeps() -> None:
     assert grown_kb < 50
 
 
-SLABS_OF_A_MONITOR = """
-import ctypes, sys
+SLABS_OF_A_MONITOR = f"""{ACCOUNT}
+import sys
 from monitor.process import loop
 from rigwatch.wire.bus.slabs import SLAB
-
-class Pools(ctypes.Structure):
-    names = "arena", "free", "fast", "maps", "mapped", "most", "held", "used", "unused", "top"
-    _fields_ = [(name, ctypes.c_size_t) for name in names]
-
-library = ctypes.CDLL(None)
-library.mallinfo2.restype = Pools
 
 def look(*_):
     before, large = library.mallinfo2().mapped, bytes(64 * SLAB)
     del large
     slabs = [bytearray(SLAB) for _ in range(8)]
-    print((library.mallinfo2().mapped - before) // SLAB, len(slabs) - 8)
+    print((library.mallinfo2().mapped - before) // SLAB)
     sys.exit()
 
 loop.joined, loop.prepared = look, lambda *_: None
@@ -320,7 +319,7 @@ loop.run(sys.argv[1])
 @on_linux
 def test_slabs_of_a_monitor_have_pages_of_their_own_after_larger_pieces(tmp_path: Path) -> None:
     with TestRig(tmp_path) as rig:
-        apart, _ = numbers_from(SLABS_OF_A_MONITOR, str(rig.path))
+        (apart,) = numbers_from(SLABS_OF_A_MONITOR, str(rig.path))
     assert apart >= 8
 
 

@@ -10,9 +10,8 @@ from rigwatch.workbench.explain import explained
 from rigwatch.workbench.explain.adequacy import closer_base
 from rigwatch.workbench.explain.explain import unless_two
 from rigwatch.workbench.ranking import no_progress
-from rigwatch.workbench.study.study import open_study
 from tests.variants.pushed import DAMPER, MODEL, RATE, SPRING, pushed
-from tests.workbench.machine import recorded, studied
+from tests.workbench.machine import studied, with_healthy
 
 UNITS = {"voltage": "V", "position": "m", "acceleration": "m/s^2"}
 NOISE = 0.45
@@ -38,10 +37,7 @@ def bench(folder: Path, compressed: float, spring: float = 60.0, damper: float =
         for seed, more in enumerate((1.0, 1.0, 0.0))
     )
     made = studied(folder, MODEL, [train], [held_out], UNITS, rates=[RATE, RATE])
-    recorded(folder / "healthy.mcap", healthy, UNITS, RATE)
-    with (made.folder / "study.toml").open("a") as file:
-        file.write('[[healthy]]\nsession = "../healthy.mcap"\n')
-    return open_bench(open_study(made.folder))
+    return open_bench(with_healthy(made, healthy, UNITS, RATE))
 
 
 def test_the_variant_that_leaves_less_of_the_healthy_recording_is_taken(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from rigwatch.wire.exchange.importing import import_file
 from rigwatch.wire.exchange.mapping import ImportMapping
 from rigwatch.workbench.study.creation import create
-from rigwatch.workbench.study.study import Study
+from rigwatch.workbench.study.study import Study, open_study
 
 Table = Mapping[str, np.ndarray]
 
@@ -44,3 +44,13 @@ def studied(  # noqa: PLR0917 -- a test helper
             text += f'[[{use}]]\nsession = "{name}"\n'
     (folder / "template.toml").write_text(text)
     return create(folder / "study", folder / "template.toml")
+
+
+def with_healthy(
+    study: Study, healthy: Table, units: Mapping[str, str], rate: float = 100.0, keys: str = ""
+) -> Study:
+    """A study of `studied` with a healthy recording; `keys` are put behind it in its file."""
+    recorded(study.folder.parent / "healthy.mcap", healthy, units, rate)
+    with (study.folder / "study.toml").open("a") as file:
+        file.write('\n[[healthy]]\nsession = "../healthy.mcap"\n' + keys)
+    return open_study(study.folder)

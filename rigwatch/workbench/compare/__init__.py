@@ -1,7 +1,7 @@
 """Compares model and measurements: errors against the noise floor, and where they occur."""
 
 from rigwatch.workbench.compare.bases import AT_NOISE, Base, Bases, find_base
-from rigwatch.workbench.compare.beside_healthy import describing_healthy, may_share
+from rigwatch.workbench.compare.beside_healthy import may_share
 from rigwatch.workbench.compare.compare import Comparison, compare, comparison
 from rigwatch.workbench.compare.decided_hold import (
     Decided,
@@ -18,13 +18,16 @@ from rigwatch.workbench.compare.location import (
 from rigwatch.workbench.compare.preparation import (
     Bench,
     bench_of,
-    beside_healthy,
     determined_by_healthy,
     open_bench,
     prepared,
     with_base,
 )
-from rigwatch.workbench.compare.shared_fit import fitted_beside_healthy
+from rigwatch.workbench.compare.shared_fit import (
+    fitted_beside_healthy,
+    refuse_what_spoils,
+    shared_bench,
+)
 from rigwatch.workbench.compare.uncertainty_budget import added_variances, apparent_strength
 from rigwatch.workbench.compare.unweighed import unweighed
 from rigwatch.workbench.compare.warm import Warm
@@ -41,10 +44,8 @@ __all__ = [
     "added_variances",
     "apparent_strength",
     "bench_of",
-    "beside_healthy",
     "compare",
     "comparison",
-    "describing_healthy",
     "determined_by_healthy",
     "find_base",
     "fitted_beside_healthy",
@@ -54,7 +55,9 @@ __all__ = [
     "open_bench",
     "prepared",
     "recording_name",
+    "refuse_what_spoils",
     "sample_numbers",
+    "shared_bench",
     "unweighed",
     "with_base",
     "with_hold_decided",

@@ -11,40 +11,29 @@ in the first only. Ranking, fits and tests are as in any other study. An effect 
 parameters no longer describe the healthy recording is refused: it has made it its own.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from msgspec import structs
 
 from rigwatch.physics.engine.equations import PRESENT, Input, Model
-from rigwatch.physics.engine.fit import Fit, Recording, apart, joined, with_effects
+from rigwatch.physics.engine.fit import Recording, apart, joined
 from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit import with_kept_free
-from rigwatch.workbench.ranking import Ranked
 from rigwatch.workbench.study import Kept, Study
 
-AS_BEFORE = 1.05
-"""Largest ratio of the healthy recording's error to that of the parameters' own fit to it: the
-allowance of the noise floor along a healthy motion."""
 TOLD = (
     "parameters of the model that the healthy recording alone leaves open are fitted to it and to"
     " the training together"
 )
-REFUSED = "the healthy recording is no longer described with it"
 
 
 def may_share(study: Study, data: Data) -> bool:
     """Whether a study keeps parameters from a healthy recording that its model runs along."""
-    if study.kept is None or data.healthy is None or is_shared(study):
+    if study.kept is None or data.healthy is None or study.model.presence is not None:
         return False
     simple = not (study.model.rough or study.moving()) and data.train.thinning is None
     return data.along_motion and simple
-
-
-def is_shared(study: Study) -> bool:
-    """Whether the training holds the healthy recording."""
-    return PRESENT in study.model.inputs
 
 
 def was_accepted_so(study: Study) -> bool:
@@ -65,23 +54,6 @@ def shared(study: Study, data: Data) -> tuple[Study, Data]:
     model = structs.replace(free, inputs=free.inputs | {PRESENT: presence})
     kept = Kept(known, np.diag(deviations**2))
     return replace(study, model=model, kept=kept), _together(study.model, data)
-
-
-def describing_healthy(
-    study: Study, data: Data, alone: Fit, rows: Sequence[Ranked]
-) -> list[Ranked]:
-    """The rows of a study that is shared; those that spoil its healthy part are refused.
-
-    Args:
-        study, data: from `shared`.
-        alone: the model fitted to the healthy recording.
-        rows: of its ranking.
-    """
-    first, most = len(with_effects(study.model, data.train)), AS_BEFORE * _size(alone, 0)
-    for row in rows:
-        if row.accepted and row.fitted is not None and _size(row.fitted.train, first) > most:
-            row.accepted, row.reason = False, REFUSED
-    return list(rows)
 
 
 def _together(model: Model, data: Data) -> Data:
@@ -110,9 +82,3 @@ def _with_presence(recording: Recording, present: float) -> Recording:
     column = np.full((len(recording), 1), present)
     driving = recording.inputs.shape[1] if recording.driving is None else recording.driving
     return replace(recording, inputs=np.hstack([recording.inputs, column]), driving=driving)
-
-
-def _size(fit: Fit, first: int) -> float:
-    """Error from a sample on, in standard deviations of noise."""
-    residuals = fit.residuals.reshape(-1, fit.residuals.shape[-1])[first:]
-    return float(np.sqrt(np.nanmean((residuals / fit.scale) ** 2)))

@@ -1,12 +1,46 @@
-"""An effect fitted to the training and the healthy recording together, see `beside_healthy.py`."""
+"""Fits to the training and the healthy recording together, see `beside_healthy.py`."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
+import numpy as np
+
+from rigwatch.physics.engine.fit import Fit, with_effects
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.compare.beside_healthy import describing_healthy, may_share
+from rigwatch.workbench.compare.beside_healthy import may_share
 from rigwatch.workbench.compare.preparation import Bench, beside_healthy
 from rigwatch.workbench.fit import fit_model
 from rigwatch.workbench.ranking import MATERIAL, STEP, Ranked, difference, refit
+
+AS_BEFORE = 1.05
+"""Largest ratio of the healthy recording's error to that of the parameters' own fit to it: the
+allowance of the noise floor along a healthy motion."""
+REFUSED = "the healthy recording is no longer described with it"
+
+
+def shared_bench(bench: Bench) -> Bench | None:
+    """The bench with the healthy recording in its training; None if it does not suit the study."""
+    if not may_share(bench.study, bench.data):
+        return None
+    try:
+        return beside_healthy(bench)
+    except ModelError:
+        return None
+
+
+def refuse_what_spoils(both: Bench, rows: Iterable[Ranked]) -> None:
+    """Refuse effects beside which the parameters no longer describe the healthy recording.
+
+    Args:
+        both: of `shared_bench`.
+        rows: of its ranking.
+    """
+    assert both.bare is not None
+    first = len(with_effects(both.study.model, both.data.train))
+    most = AS_BEFORE * _size(both.bare.train, 0)
+    for row in rows:
+        if row.accepted and row.fitted is not None and _size(row.fitted.train, first) > most:
+            row.accepted, row.reason = False, REFUSED
 
 
 def fitted_beside_healthy(bench: Bench, row: Ranked) -> tuple[Bench, Ranked] | None:
@@ -19,18 +53,20 @@ def fitted_beside_healthy(bench: Bench, row: Ranked) -> tuple[Bench, Ranked] | N
         bench: the study.
         row: an effect that is fitted alone beside its model.
     """
-    if row.fitted is None or not may_share(bench.study, bench.data):
-        return None
-    try:
-        both = beside_healthy(bench)
-    except ModelError:
+    both = shared_bench(bench) if row.fitted is not None else None
+    if both is None or row.fitted is None:
         return None
     other = replace(row, start=row.placement.own(row.fitted.train.values()))
     refit(both.study, both.data, both.base, other, fit_model)
-    assert both.bare is not None
-    describing_healthy(both.study, both.data, both.bare.train, [other])
+    refuse_what_spoils(both, [other])
     if not other.accepted or other.fitted is None:
         return None
     fall = difference(row.fitted.held_out, other.fitted.held_out)
     less = fall.p_falls < STEP and fall.relative > MATERIAL
     return (both, other) if less else None
+
+
+def _size(fit: Fit, first: int) -> float:
+    """Error from a sample on, in standard deviations of noise."""
+    residuals = fit.residuals.reshape(-1, fit.residuals.shape[-1])[first:]
+    return float(np.sqrt(np.nanmean((residuals / fit.scale) ** 2)))

@@ -4,15 +4,14 @@ from dataclasses import dataclass, replace
 
 from msgspec import structs
 
-from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import (
     Bench,
     Decided,
-    beside_healthy,
-    describing_healthy,
     fitted_beside_healthy,
     may_share,
     open_bench,
+    refuse_what_spoils,
+    shared_bench,
     with_base,
     with_hold_decided,
 )
@@ -135,13 +134,11 @@ def _beside_healthy(first: Explained, progress: Progress) -> Explained:
     if not asked or study.file.effects or not may_share(study, data):
         return first
     progress("fitting what the healthy recording leaves open to it and the training together")
-    try:
-        bench = beside_healthy(first.bench)
-    except ModelError:
+    bench = shared_bench(first.bench)
+    if bench is None:
         return first
-    assert bench.bare is not None
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
-    rows = describing_healthy(bench.study, bench.data, bench.bare.train, rows)
+    refuse_what_spoils(bench, rows)
     second = _explained_once(bench, progress, rows)
     if second.explanation.verdict != "missing_effect":
         return first

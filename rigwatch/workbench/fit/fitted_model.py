@@ -14,7 +14,7 @@ from rigwatch.physics.engine.compile import (
     even_substeps,
     resolved,
 )
-from rigwatch.physics.engine.equations import PRESENT, Placement, System, compose
+from rigwatch.physics.engine.equations import Placement, System, compose
 from rigwatch.physics.engine.fit import (
     Fit,
     Recording,
@@ -260,7 +260,7 @@ def _trained(  # noqa: PLR0917 -- the arguments of `fit_model`
     if data.along_motion and len(compiled.system.free) >= MANY_PARAMETERS and scale is not None:
         search = WholeRuns(
             compiled, _in_windows(data.train, horizon), scale, start=begin, substeps=substeps,
-            thorough=True, starts=0 if PRESENT in study.model.inputs else STARTS,
+            thorough=True, starts=STARTS if study.model.presence is None else 0,
         )  # fmt: skip
     elif multi_start and not data.along_motion:
         noise = quiet_scale(data.train) if scale is None else scale
@@ -346,7 +346,7 @@ def _judged(  # noqa: PLR0917 -- they belong together
 ) -> Fitted:
     """A fit with its held-out error."""
     # Of a training that is shared with a healthy recording the windows are its parts.
-    windowed = study.model.states and PRESENT not in study.model.inputs
+    windowed = study.model.states and study.model.presence is None
     length = data.horizon if windowed else len(data.held_out)
     substeps = study.file.substeps
     found = with_opening_values(found, study.model, data.openings, data.horizon, substeps)

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from rigwatch.physics.engine.compile import cores, side_by_side
-from rigwatch.physics.engine.equations import PRESENT, Placement
+from rigwatch.physics.engine.equations import Placement
 from rigwatch.physics.engine.search import undetermined
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, NoiseFloor, lowered
@@ -66,7 +66,7 @@ def _ended(study: Study, base: Fitted) -> dict[str, float]:
     Where parameters are shared with a recording without effects, they begin where that alone has
     them: the base model's have followed what is missing in the other.
     """
-    own = study.model.parameters if PRESENT in study.model.inputs else {}
+    own = {} if study.model.presence is None else study.model.parameters
     return base.train.values() | {name: p.value for name, p in own.items()}
 
 

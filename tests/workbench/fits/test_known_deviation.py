@@ -14,8 +14,8 @@ from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.compare.uncertainty_budget import added_variances
 from rigwatch.workbench.compare.unweighed import unweighed
 from rigwatch.workbench.fit import poorly_determined
-from rigwatch.workbench.study.study import Kept, Study, open_study
-from tests.workbench.machine import Table, recorded, studied
+from rigwatch.workbench.study.study import Kept, Study
+from tests.workbench.machine import Table, studied, with_healthy
 
 MODEL = """
 name = "slide"
@@ -54,10 +54,7 @@ def compared(folder: Path, healthy: Table, deviation: str, keys: str = "") -> Co
 def rubbing(folder: Path, healthy: Table, deviation: str, keys: str = "") -> Study:
     model = MODEL.replace("DEVIATION", deviation)
     study = studied(folder, model, [run(0, 0.3, 1000)], [run(1, 0.3, 1000)], UNITS, keys)
-    recorded(folder / "healthy.mcap", healthy, UNITS)
-    with (study.folder / "study.toml").open("a") as file:
-        file.write('[[healthy]]\nsession = "../healthy.mcap"\n' + EFFECT)
-    return open_study(study.folder)
+    return with_healthy(study, healthy, UNITS, keys=EFFECT)
 
 
 def test_a_strength_is_no_better_known_than_the_mass_it_is_told_by(tmp_path: Path) -> None:

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from rigwatch.wire.kernel import kernel
-from rigwatch.workbench.compare import Bench, beside_healthy, locate, may_share, open_bench
+from rigwatch.workbench.compare import Bench, locate, may_share, open_bench, shared_bench
 from rigwatch.workbench.explain.explain import _explained_once, explained
 from rigwatch.workbench.explain.explanation import Explanation
 from rigwatch.workbench.ranking import no_progress
 from rigwatch.workbench.steps.change import add
 from rigwatch.workbench.study.study import open_study
-from tests.workbench.machine import Table, recorded, studied
+from tests.workbench.machine import Table, studied, with_healthy
 from tests.workbench.simulated import with_few_effects
 
 MODEL = """
@@ -89,10 +89,7 @@ def bench(folder: Path, lines: tuple[float, float] = APART, **hidden: float) -> 
     """A study of the machine with something hidden in it, and of the healthy one, fitted."""
     train, held_out = (run(seed, lines, **hidden) for seed in (1, 2))
     made = studied(folder, MODEL, [train], [held_out], UNITS, rates=[RATE, RATE])
-    recorded(folder / "healthy.mcap", run(3, lines), UNITS, RATE)
-    with (made.folder / "study.toml").open("a") as file:
-        file.write('[[healthy]]\nsession = "../healthy.mcap"\n')
-    return with_few_effects(open_bench(open_study(made.folder)))
+    return with_few_effects(open_bench(with_healthy(made, run(3, lines), UNITS, RATE)))
 
 
 def named(found: Explanation) -> str:
@@ -146,7 +143,8 @@ def test_nothing_is_missing_where_nothing_is_hidden(tmp_path: Path) -> None:
 
 def test_the_training_holds_both_recordings_and_what_is_held_out_stays(tmp_path: Path) -> None:
     made = bench(tmp_path, stiffer=60.0)
-    both = beside_healthy(made)
+    both = shared_bench(made)
+    assert both is not None
     assert both.data.train.parts == (len(made.data.train), len(made.data.healthy))
     assert np.array_equal(both.data.held_out.outputs, made.data.held_out.outputs, equal_nan=True)
     assert set(both.base.compiled.system.free) == {"k", "c", "g", "w", "wr"}

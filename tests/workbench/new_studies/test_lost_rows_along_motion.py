@@ -8,8 +8,7 @@ import pytest
 
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.preparation import Bench, open_bench
-from rigwatch.workbench.study.study import open_study
-from tests.workbench.machine import recorded, studied
+from tests.workbench.machine import studied, with_healthy
 
 COIL = """
 name = "coil"
@@ -101,9 +100,7 @@ def test_a_machine_that_does_not_move_is_no_recording_of_its_motion(tmp_path: Pa
     still, moving = _moved(2).copy(), _named(_moved(1))
     still[:, 1:] = (1e-6, 0.02) * np.random.default_rng(3).standard_normal((SAMPLES, 2))
     study = studied(tmp_path, COIL, [_named(still)], [moving], UNITS, rates=[RATE] * 2)
-    with (study.folder / "study.toml").open("a") as file:
-        file.write('\n[[healthy]]\nsession = "../healthy.mcap"\n')
-    recorded(tmp_path / "healthy.mcap", moving, UNITS, RATE)
+    study = with_healthy(study, moving, UNITS, RATE)
 
     with pytest.raises(ModelError, match="train: found no sample that counts along"):
-        open_bench(open_study(study.folder))
+        open_bench(study)

@@ -10,8 +10,7 @@ import numpy as np
 
 from rigwatch.wire.kernel import kernel
 from rigwatch.workbench.compare import Bench, open_bench
-from rigwatch.workbench.study.study import open_study
-from tests.workbench.machine import recorded, studied
+from tests.workbench.machine import studied, with_healthy
 from tests.workbench.verdicts.test_refinements import MODEL, RATE, UNITS, Machine, run
 
 MIDDLE, HALF_WIDTH, SPEED = 0.004, 0.01, 60.0
@@ -85,7 +84,4 @@ def bench(folder: Path, hidden: Hidden, model: str = MODEL) -> Bench:
     machine = slide(hidden)
     train, held_out, healthy = (run(seed, float(seed < 2), machine=machine) for seed in range(3))
     made = studied(folder, model, [train], [held_out], UNITS, rates=[RATE, RATE])
-    recorded(folder / "healthy.mcap", healthy, UNITS, RATE)
-    with (made.folder / "study.toml").open("a") as file:
-        file.write('[[healthy]]\nsession = "../healthy.mcap"\n')
-    return open_bench(open_study(made.folder))
+    return open_bench(with_healthy(made, healthy, UNITS, RATE))

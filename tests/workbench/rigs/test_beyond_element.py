@@ -16,7 +16,7 @@ from rigwatch.workbench.explain.explain import explained
 from rigwatch.workbench.ranking.series_order import order_matters
 from rigwatch.workbench.study.study import Study, open_study
 from tests.workbench.fits.test_strength_intervals import MODEL, PERIOD, RATE, drive
-from tests.workbench.machine import Table, recorded, studied
+from tests.workbench.machine import Table, studied, with_healthy
 from tests.workbench.simulated import COMMON, knowing
 
 DRIVEN = MODEL.replace("w*(g*u - q)", "w*(g*drive - q)") + (
@@ -63,10 +63,7 @@ def study_of(folder: Path, before: float, behind: float) -> Study:
     train, held_out = ([table(seed, before, behind)] for seed in range(2))
     keys = f'variants = ["valve_hysteresis@drive(b={0.8 * PLAY})"]'
     made = studied(folder, DRIVEN, train, held_out, UNITS, keys, rates=[RATE] * 2)
-    recorded(folder / "healthy.mcap", table(2, 0.0, 0.0), UNITS, RATE)
-    with (made.folder / "study.toml").open("a") as file:
-        file.write('\n[[healthy]]\nsession = "../healthy.mcap"\n')
-    return open_study(made.folder)
+    return with_healthy(made, table(2, 0.0, 0.0), UNITS, RATE)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from rigwatch.workbench.ranking import no_progress
 from rigwatch.workbench.study.elements import elements_of
 from rigwatch.workbench.study.study import Study, open_study
 from tests.workbench.fits.test_strength_intervals import MODEL, RATE, slide
-from tests.workbench.machine import Table, recorded, studied
+from tests.workbench.machine import Table, studied, with_healthy
 from tests.workbench.simulated import COMMON, knowing
 
 UNITS = {"u": "N", "position": "m", "acceleration": "m/s^2"}
@@ -41,10 +41,7 @@ def rubbing(folder: Path, healthy: float) -> Study:
     """The study of a slide that rubs by `FAULT` more than a healthy one [N]."""
     train, held_out = ([table(seed, healthy + FAULT)] for seed in range(2))
     made = studied(folder, MODEL, train, held_out, UNITS, rates=[RATE] * 2)
-    recorded(folder / "healthy.mcap", table(2, healthy), UNITS, RATE)
-    with (made.folder / "study.toml").open("a") as file:
-        file.write('\n[[healthy]]\nsession = "../healthy.mcap"\n')
-    return knowing(open_study(made.folder), *COMMON)
+    return knowing(with_healthy(made, table(2, healthy), UNITS, RATE), *COMMON)
 
 
 def test_more_friction_is_named_beside_what_the_healthy_slide_has(study: Study) -> None:

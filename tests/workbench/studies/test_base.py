@@ -8,7 +8,7 @@ import pytest
 from rigwatch.commands import main
 from rigwatch.workbench.compare import find_base
 from rigwatch.workbench.study.study import open_study
-from tests.workbench.machine import recorded, studied
+from tests.workbench.machine import studied, with_healthy
 from tests.workbench.studies.test_own_model import PORT, SPEED, UNITS, run
 
 VARIANTS = """
@@ -28,10 +28,7 @@ states.v = { unit = "rad/s", derivative = "b*u + load", measured = "v" }
 @pytest.fixture
 def study(tmp_path: Path) -> Path:
     found = studied(tmp_path, SPEED + PORT + VARIANTS, [run(0)], [run(1)], UNITS)
-    recorded(tmp_path / "healthy.mcap", run(2), UNITS)
-    with (found.folder / "study.toml").open("a") as file:
-        file.write('\n[[healthy]]\nsession = "../healthy.mcap"\n')
-    return found.folder
+    return with_healthy(found, run(2), UNITS).folder
 
 
 def test_the_variant_that_the_rig_has_is_enough_is_taken_and_undone(

@@ -8,8 +8,7 @@ import numpy as np
 from rigwatch.wire.kernel import kernel
 from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.explain import ranking
-from rigwatch.workbench.study.study import open_study
-from tests.workbench.machine import Table, recorded, studied
+from tests.workbench.machine import Table, studied, with_healthy
 
 MODEL = """
 name = "slide"
@@ -71,10 +70,7 @@ def run(seed: int, strength: float, samples: int = 4096, machine: Machine = slid
 
 def test_presliding_and_centre_of_a_slide_that_binds_are_found(tmp_path: Path) -> None:
     made = studied(tmp_path, MODEL, [run(0, 20.0)], [run(1, 20.0)], UNITS, rates=[RATE, RATE])
-    recorded(tmp_path / "healthy.mcap", run(2, 0.0), UNITS, RATE)
-    with (made.folder / "study.toml").open("a") as file:
-        file.write('[[healthy]]\nsession = "../healthy.mcap"\n')
-    bench = open_bench(open_study(made.folder))
+    bench = open_bench(with_healthy(made, run(2, 0.0), UNITS, RATE))
     assert bench.data.along_motion
 
     rows, verdict = ranking(bench)

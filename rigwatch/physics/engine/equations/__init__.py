@@ -28,6 +28,7 @@ from rigwatch.physics.engine.equations.measured_motion import (
     unmoved_at_rest,
 )
 from rigwatch.physics.engine.equations.model import (
+    PRESENT,
     Hold,
     Input,
     Model,
@@ -55,7 +56,6 @@ from rigwatch.physics.engine.equations.quantities import (
 from rigwatch.physics.engine.equations.scope import symbol
 from rigwatch.physics.engine.equations.system import (
     LEFT,
-    PRESENT,
     PROBE,
     RATE,
     STEP,

@@ -35,6 +35,9 @@ Text = Annotated[str, Meta(min_length=1)]
 
 Hold = Literal["linear", "zero"]
 
+PRESENT = "present_"
+"""Name of an input that is 1 in recordings with effects, and 0 in those without."""
+
 
 class Input(Section, frozen=True, kw_only=True):
     """A signal that drives the model."""
@@ -251,6 +254,11 @@ class Model(Section, frozen=True, kw_only=True):
     def held(self, name: str) -> Hold:
         """The hold of an input between samples; linear by default."""
         return self.inputs[name].hold or self.hold or "linear"
+
+    @property
+    def presence(self) -> int | None:
+        """Place of the input `PRESENT`; None if effects are present in all recordings."""
+        return [*self.inputs].index(PRESENT) if PRESENT in self.inputs else None
 
     def driving(self) -> tuple[str, ...]:
         """Inputs that change within a recording."""

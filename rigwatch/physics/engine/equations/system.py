@@ -16,7 +16,7 @@ from msgspec import structs
 
 from rigwatch.physics.engine.equations.effect import Effect
 from rigwatch.physics.engine.equations.expression import names_in
-from rigwatch.physics.engine.equations.model import Model, Parameter, Port, State
+from rigwatch.physics.engine.equations.model import PRESENT, Model, Parameter, Port, State
 from rigwatch.physics.engine.equations.quantities import hold_at, in_order, signals_at, spelt_out
 from rigwatch.physics.engine.equations.scope import Scope, symbol
 from rigwatch.wire.errors import ModelError
@@ -28,8 +28,6 @@ RATE = "rate"
 STEP = "step"
 """Name, for directions of effects at a signal port, of the signal's change over a sample."""
 UNTIL = "until_"
-PRESENT = "present_"
-"""Name of an input that is 1 in recordings with effects, and 0 in those without."""
 LEFT = "left"
 """Name, for effects at a signal port, of the time until a held input changes; 0 otherwise.
 
@@ -214,7 +212,7 @@ class _Composer:
         self._variables: dict[str, dict[str, sympy.Expr]] = {}
         self._updates: dict[str, sympy.Expr] = {}
         self._scope = Scope()
-        self._present = symbol(PRESENT) if PRESENT in model.inputs else sympy.Integer(1)
+        self._present = sympy.Integer(1) if model.presence is None else symbol(PRESENT)
         self._spelt_out = spelt_out(model)
         self._waiting = list(in_order(model))
         self._scope.define(TIME, symbol(TIME), "s")

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from rigwatch.physics.engine.equations import PRESENT, Model, System
+from rigwatch.physics.engine.equations import Model, System
 from rigwatch.physics.engine.fit.decimation import Thinning
 from rigwatch.physics.transfer import Derivative
 from rigwatch.wire.arrays import FloatArray, IntArray
@@ -177,11 +177,10 @@ def apart(recording: Recording) -> list[Recording]:
 
 
 def with_effects(model: Model, recording: Recording) -> Recording:
-    """The first samples of a recording, in which effects are present: all without `PRESENT`."""
-    if PRESENT not in model.inputs:
+    """The first samples of a recording, in which effects are present: see `Model.presence`."""
+    if model.presence is None:
         return recording
-    present = recording.inputs[:, list(model.inputs).index(PRESENT)] > 0.0
-    return recording.stretch(0, int(present.sum()))
+    return recording.stretch(0, int(np.sum(recording.inputs[:, model.presence] > 0.0)))
 
 
 def of_parts(spacings: Sequence[float], lengths: Sequence[int]) -> tuple[float, tuple[float, ...]]:

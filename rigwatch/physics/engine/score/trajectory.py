@@ -11,7 +11,6 @@ import sympy
 from rigwatch.physics.engine.compile import CompiledSystem, Linearisation, numpy_function
 from rigwatch.physics.engine.equations import (
     LEFT,
-    PRESENT,
     RATE,
     STEP,
     TIME,
@@ -116,8 +115,8 @@ def port_signals(at: Trajectory, port_name: str) -> dict[str, FloatArray]:
 
 def presence(at: Trajectory) -> FloatArray | float:
     """Where effects are present, at the nodes, shape (windows, nodes); 1 if they are everywhere."""
-    inputs = list(at.compiled.system.model.inputs)
-    return at.inputs[..., inputs.index(PRESENT)] if PRESENT in inputs else 1.0
+    place = at.compiled.system.model.presence
+    return 1.0 if place is None else at.inputs[..., place]
 
 
 def _step(signal: FloatArray, substeps: int) -> FloatArray:

@@ -3,7 +3,6 @@
 import numpy as np
 
 from rigwatch.wire.arrays import FloatArray, IntArray
-from rigwatch.workbench.compare.beside_healthy import is_shared
 from rigwatch.workbench.compare.preparation import Bench
 from rigwatch.workbench.study import Span
 
@@ -39,5 +38,5 @@ def recording_time(bench: Bench, rows: IntArray) -> tuple[IntArray, FloatArray]:
 def _span(bench: Bench, at: int) -> Span | None:
     """The section of a training recording in the study; None if they are in memory alone."""
     file = bench.study.file
-    spans = (*file.train, *file.healthy) if is_shared(bench.study) else file.train
+    spans = file.train if bench.study.model.presence is None else (*file.train, *file.healthy)
     return spans[at] if len(spans) == len(bench.data.train.slices) else None
