@@ -1,4 +1,4 @@
-"""`python -m monitor.diagnosis FOLDER` ranks the request in a folder; the monitor starts it."""
+"""`python -m monitor.diagnosis` ranks the request at its input; the monitor starts it."""
 
 import sys
 

@@ -5,13 +5,11 @@ the samples, requests the ranking and handles the answer.
 """
 
 import queue
-import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise, starmap
-from pathlib import Path
 
 import numpy as np
 
@@ -153,8 +151,7 @@ class Explainer:
         signals, change = _arrays(judged, model.channels)
         onset = max(alarm.onset_seq - judged[0][0].seq, 0)
         try:
-            with tempfile.TemporaryDirectory() as folder:
-                text = ask(Path(folder), signals, change, onset, model, self._files, self._child)
+            text = ask(signals, change, onset, model, self._files, self._child)
         except OSError as error:
             text = failed(f"its process could not be started: {reason_of(error)}")
         if self._ended:

@@ -15,8 +15,13 @@ class Child:
         self._number: int | None = None
         self._ended = False
 
-    def run(self, words: Sequence[str]) -> int:
+    def run(self, words: Sequence[str], given: int | None = None, told: int | None = None) -> int:
         """Start Python with these arguments and wait until it has ended; nothing after `end`.
+
+        Args:
+            words: the arguments.
+            given: descriptor of what is its standard input; this process's if None.
+            told: the same of its standard output.
 
         Returns:
             its exit code; that of a process that a signal has ended is the negative signal.
@@ -27,7 +32,7 @@ class Child:
         with self._lock:
             if self._ended:
                 return 0
-            self._number = number = _started(words)
+            self._number = number = _started(words, given, told)
         # The number stays the child's until it is waited for, so that `end` kills nobody else.
         os.waitid(os.P_PID, number, os.WEXITED | os.WNOWAIT)
         with self._lock:
@@ -42,7 +47,16 @@ class Child:
                 os.kill(self._number, signal.SIGKILL)
 
 
-def _started(words: Sequence[str]) -> int:
+def _started(words: Sequence[str], given: int | None, told: int | None) -> int:
     # A child would inherit the monitor's real-time class.
     ordinary = os.SCHED_OTHER, os.sched_param(0)
-    return os.posix_spawn(sys.executable, [sys.executable, *words], os.environ, scheduler=ordinary)
+    ends = [
+        (os.POSIX_SPAWN_DUP2, own, at) for at, own in enumerate((given, told)) if own is not None
+    ]
+    return os.posix_spawn(
+        sys.executable,
+        [sys.executable, *words],
+        os.environ,
+        file_actions=ends,
+        scheduler=ordinary,
+    )

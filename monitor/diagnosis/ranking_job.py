@@ -1,22 +1,24 @@
 """The ranking process, started by the monitor.
 
-    python -m monitor.diagnosis FOLDER
+    request ─▶ python -m monitor.diagnosis ─▶ answer
 
 A thread would share the interpreter with the monitor's loop, and delay samples while it imports and
-computes. The folder holds the request, and receives the answer.
+computes. Request and answer are files in memory that have no name: a ranking needs no room on a
+disk, and a monitor that is killed leaves nothing behind.
 """
 
 import json
 import os
 import signal
 import sys
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import IO
 
 import numpy as np
 
 from monitor.diagnosis.child import Child
-from monitor.model import RigModel, load_model, model_text
+from monitor.model import RigModel, model_text, parse_model
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import RigwatchError
 
@@ -24,11 +26,9 @@ LONGEST = 300
 """Time limit of a job [s]; the first on a machine compiles the effects."""
 NICENESS = 10
 MODULE = "monitor.diagnosis"
-_EVIDENCE, _MODEL, _EFFECTS, _ANSWER = "evidence.npz", "model.toml", "effects.json", "answer.txt"
 
 
-def ask(  # noqa: PLR0917 -- what is put into the folder
-    folder: Path,
+def ask(  # noqa: PLR0917 -- what the request holds
     signals: FloatArray,
     change: FloatArray,
     onset: int,
@@ -39,14 +39,24 @@ def ask(  # noqa: PLR0917 -- what is put into the folder
     """Wait for the ranking as text; if the job or its `child` was ended, why there is none.
 
     Raises:
-        OSError: the folder cannot be written, or the job not started.
+        OSError: the request cannot be kept, or the job not started.
     """
-    np.savez(folder / _EVIDENCE, signals=signals, change=change, onset=onset)
-    (folder / _MODEL).write_text(model_text(model), encoding="utf-8")
-    (folder / _EFFECTS).write_text(json.dumps(list(effect_files)), encoding="utf-8")
-    code = (child or Child()).run(["-m", MODULE, str(folder)])
-    answer = folder / _ANSWER
-    return answer.read_text(encoding="utf-8") if answer.exists() else failed(_why(code))
+    with _in_memory("request") as request, _in_memory("answer") as told:
+        evidence = {"signals": signals, "change": change, "onset": onset}
+        texts = {"model": model_text(model), "effects": json.dumps(list(effect_files))}
+        np.savez(request, **evidence, **texts)  # type: ignore[arg-type]
+        request.seek(0)
+        code = (child or Child()).run(["-m", MODULE], request.fileno(), told.fileno())
+        told.seek(0)
+        text = told.read().decode("utf-8")
+    return text if text and not code else failed(_why(code))
+
+
+@contextmanager
+def _in_memory(name: str) -> Iterator[IO[bytes]]:
+    """A file in memory; `name` is shown where the kernel lists open files."""
+    with os.fdopen(os.memfd_create(f"rigwatch-{name}"), "w+b") as file:
+        yield file
 
 
 def failed(why: str) -> str:
@@ -62,8 +72,8 @@ def _why(code: int) -> str:
     return f"its process ended with code {code}, the monitor's output says more"
 
 
-def answer(folder: Path) -> str:
-    """Process the request in `folder`.
+def answer(request: IO[bytes]) -> str:
+    """Process a request.
 
     Raises:
         RigwatchError: a file of effects is malformed.
@@ -72,24 +82,24 @@ def answer(folder: Path) -> str:
     from monitor.diagnosis.observed_change import Evidence
     from rigwatch.physics.engine.equations import library, offered
 
-    with np.load(folder / _EVIDENCE) as kept:
+    with np.load(request) as kept:
         evidence = Evidence(kept["signals"], kept["change"], int(kept["onset"]))
-    files = json.loads((folder / _EFFECTS).read_text(encoding="utf-8"))
-    effects = library() | offered(files)
-    return in_words(suspects(evidence, load_model(folder / _MODEL), effects))
+        model = parse_model(str(kept["model"]), "the monitor's model")
+        files = json.loads(str(kept["effects"]))
+    return in_words(suspects(evidence, model, library() | offered(files)))
 
 
 def main() -> int:
     """0 if there is an answer."""
     os.nice(NICENESS)
     signal.alarm(LONGEST)
-    folder = Path(sys.argv[1])
-    # Written to a temporary file and renamed, so that an answer is complete or absent.
-    beside = folder / "answer.new"
+    # What a library prints goes to the monitor's own output, and not into the answer.
+    told = os.dup(sys.stdout.fileno())
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     try:
-        text = answer(folder)
+        text = answer(sys.stdin.buffer)
     except RigwatchError as error:
         text = f"probably missing: cannot tell, {error}"
-    beside.write_text(text, encoding="utf-8")
-    beside.replace(folder / _ANSWER)
+    with os.fdopen(told, "wb") as file:
+        file.write(text.encode())
     return 0

@@ -95,6 +95,13 @@ def _coupled(signal: FloatArray, dt: float) -> FloatArray:
     return np.asarray(signal - slow)
 
 
+def _on_a_bracket(signal: FloatArray, dt: float) -> FloatArray:
+    """Seen from a bracket that rings at 14 Hz."""
+    pole = 2 * math.pi * 14.0
+    time = dt * np.arange(len(signal))
+    return np.asarray(lsim(([pole**2], [1.0, 0.1 * pole, pole**2]), signal, time)[1])
+
+
 def _hummed(signal: FloatArray, dt: float) -> FloatArray:
     """The mains, 50 times a second."""
     return np.asarray(signal + 0.3 * np.cos(100 * np.pi * dt * np.arange(len(signal)) + 0.6))
@@ -115,6 +122,7 @@ OF_ACCELERATION: dict[str, Change] = {
     "delay_after_lag": lambda read, dt: _late(_low_pass(read, dt, 0.025), dt),
     "delay": _late,
     "ac_coupling": _coupled,
+    "mounting_resonance": _on_a_bracket,
 }
 OF_POSITION: dict[str, Change] = {
     "sensor_play": _played,

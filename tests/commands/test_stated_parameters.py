@@ -55,10 +55,11 @@ def test_a_mass_that_is_stated_is_the_model_s(
         (("m=-0.3",), "servo-pneumatic: found m = -0.3, expected at least 0.01 kg"),
         (("m=nan",), "servo-pneumatic: found m = nan"),
         (("m",), "--set: found 'm', expected NAME=VALUE such as m=0.31"),
+        (("m=300 g",), "such as m=0.31; a unit stands in brackets: 'm=300[g]'"),
         (("m=0.3", "--scheme", "transfer"), "--set: found no model of equations"),
         (("m=0.3", "--plant", "inertia"), "--set: found no model of equations"),
     ],
-    ids=["unknown", "negative", "no number", "no value", "transfer function", "inertia"],
+    ids=["unknown", "negative", "no number", "no value", "unit", "transfer function", "inertia"],
 )
 def test_what_cannot_be_stated_is_refused_before_anything_is_read(
     words: tuple[str, ...], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

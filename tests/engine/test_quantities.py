@@ -130,6 +130,17 @@ def test_a_slip_is_one_line(changed: dict[str, str], said: str) -> None:
     assert "\n" not in str(found.value)
 
 
+def test_of_ports_that_wait_for_each_other_the_one_in_the_wrong_is_told() -> None:
+    model = _named(push="f - spring + 0.1*winding")
+    port = replace(model.ports["load"], variables={}, passive=True)
+    used = Quantity(expression="push", unit="N")
+    waits = replace(port, variables={"L": used})
+    ports = model.ports | {"load": waits, "winding": replace(port, variables={"L": used})}
+
+    with pytest.raises(ModelError, match="port winding: variable L: found 'push'"):
+        check_model(replace(model, ports=ports))
+
+
 def test_quantities_that_grow_beyond_measure_are_refused() -> None:
     grown = {f"q{n}": f"q{n - 1} + sin(q{n - 1}/f)*q{n - 1}" for n in range(1, 40)}
 

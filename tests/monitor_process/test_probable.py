@@ -1,6 +1,7 @@
 """An alarm is followed by what is probably missing, ranked without making samples wait."""
 
 import re
+import tempfile
 from collections.abc import Iterable
 from copy import deepcopy
 from dataclasses import replace
@@ -22,7 +23,7 @@ from rigwatch.physics.engine.equations.effect import Effect, EffectParameter
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.simulated import simulate
 from rigwatch.wire.messages.blocks import concatenate, pieces
-from rigwatch.wire.messages.message_types import Alarm, Event, SampleBlock
+from rigwatch.wire.messages.message_types import Alarm, Column, EstimateBlock, Event, SampleBlock
 from rigwatch.wire.session import open_session
 from sim_plant.excitation import Sine
 from sim_plant.scenario import Event as Fault
@@ -196,9 +197,34 @@ def test_a_file_of_effects_that_does_not_fit_is_reported_in_the_answer(tmp_path:
     wrong = tmp_path / "mine.toml"
     wrong.write_text("[effects.mine]\n")
     found = evidence("coulomb", 0.3)
-    text = ask(tmp_path, found.signals, found.change, found.onset, RIG, [str(wrong)])
+    text = ask(found.signals, found.change, found.onset, RIG, [str(wrong)])
     assert text.startswith("probably missing: cannot tell")
     assert "mine.toml" in text
+
+
+def test_a_ranking_needs_no_disk_and_leaves_nothing_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "full"))
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "full"))
+    explainer, found = Explainer(lambda: RIG), evidence("coulomb", 0.3)
+    columns = zip(RIG.channels, found.signals.T, strict=True)
+    count = len(found.change)
+    times, flags = np.arange(count, dtype=np.int64), np.zeros(count, np.uint8)
+    channels = tuple([Column(name, "", values, flags) for name, values in columns])
+    alarm = Alarm(
+        "departure", "unacknowledged", "warning", "a cause", "", "rig", 7, found.onset, 0, 1.0, 0.0,
+        0.5, True, "", 0,
+    )  # fmt: skip
+    explainer.hear(alarm)
+    change = Column("change", "m/s^2", found.change)
+    samples = SampleBlock("rig", 7, 0, times, times, channels)
+    explainer.take(EstimateBlock("rig", 7, 0, times, (change,)), samples)
+    told: list[Event] = []
+    eventually(lambda: told.extend(explainer.results()) or told, "an answer")
+    explainer.close()
+    assert "coulomb@load" in told[0].text
+    assert not (tmp_path / "full").exists()
 
 
 def ranked(model: RigModel, blocks: Iterable[SampleBlock]) -> tuple[str, list[Alarm]]:

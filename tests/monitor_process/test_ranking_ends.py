@@ -41,7 +41,7 @@ def test_a_ranking_gets_every_sample_and_few_blocks_wait_for_it(
 ) -> None:
     got: list[np.ndarray] = []
     monkeypatch.setattr(
-        background_ranking, "ask", lambda _, *rest: got.extend(rest[:2]) or "an answer"
+        background_ranking, "ask", lambda *given: got.extend(given[:2]) or "an answer"
     )
     model = structs.replace(RIG, channels=("voltage", "position"))
     explainer, whole, before = Explainer(lambda: model), block(0, 7 * 256), blocks_in_memory()
@@ -85,13 +85,12 @@ def test_a_monitor_that_ends_while_a_ranking_starts_waits_for_no_answer(
 ) -> None:
     started, go_on = threading.Event(), threading.Event()
 
-    def held(folder: Path, *_: object) -> str:
-        child = _[-1]
+    def held(*given: object) -> str:
+        child = given[-1]
         assert isinstance(child, Child)
         started.set()
         assert go_on.wait(60.0)
         child.run(["-c", "import time; time.sleep(600)"])
-        (folder / "there").touch()
         return "an answer"
 
     monkeypatch.setattr(background_ranking, "ask", held)
@@ -136,6 +135,5 @@ def test_why_a_ranking_has_ended_without_an_answer_is_told(
     (tmp_path / "endings.py").write_text(code)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.setattr(ranking_job, "MODULE", "endings")
-    (tmp_path / "job").mkdir()
-    text = ranking_job.ask(tmp_path / "job", np.zeros((1, 1)), np.zeros(1), 0, RIG, ())
+    text = ranking_job.ask(np.zeros((1, 1)), np.zeros(1), 0, RIG, ())
     assert text.startswith(f"probably missing: cannot tell, the ranking failed: {why}")

@@ -19,6 +19,7 @@ from rigwatch.workbench.catalogue import (
     model_report,
     text_plot,
 )
+from tests.workbench.studies.test_recordings_apart import DAMPER
 
 GUIDE = Path(__file__).parents[2] / "docs" / "models.md"
 SNIPPETS = re.findall(r"```toml\n(.*?)```", GUIDE.read_text("utf-8"), re.DOTALL)
@@ -233,6 +234,15 @@ def test_a_run_is_drawn_in_the_units_shown_and_absolute_factors_are_told(
     assert curve.up == "T [degC]"
     assert curve.y[0] == pytest.approx(20.0)
     assert curve.y[-1] == pytest.approx(end, abs=0.5)
+
+
+def test_a_model_without_states_has_no_run_and_is_told_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "damper.toml"
+    file.write_text(DAMPER)
+    assert main(["model", "check", str(file)]) == 0
+    assert "no run is drawn: without states" in capsys.readouterr().out
 
 
 def test_the_inputs_of_a_run_are_in_the_units_of_the_file() -> None:

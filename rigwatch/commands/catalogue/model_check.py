@@ -62,6 +62,8 @@ def _of_run(model: "Model", report: "ModelReport") -> list[str]:
     """What the run that is drawn begins with."""
     from rigwatch.workbench.catalogue import inputs_of_run
 
+    if not model.states:
+        return ["  no run is drawn: without states the outputs follow the inputs at once"]
     held = inputs_of_run(model, report)
     chosen = f", with {held} (others: --input NAME=VALUE)" if held else ""
     return [f"  a run from the file's starting values{chosen}:"] if report.run else []

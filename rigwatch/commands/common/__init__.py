@@ -6,7 +6,7 @@ from rigwatch.commands.common.log_arguments import add_log_columns
 from rigwatch.commands.common.log_questions import LOGS, ask_for_logs, can_ask
 from rigwatch.commands.common.many_studies import add_studies, run_studies, the_study
 from rigwatch.commands.common.marks import marks_of
-from rigwatch.commands.common.named_values import named_values, number_in_unit
+from rigwatch.commands.common.named_values import hint_of_unit, named_values, number_in_unit
 from rigwatch.commands.common.numbers import PORT, POSITIVE, number, whole
 from rigwatch.commands.common.operator_argument import add_user
 from rigwatch.commands.common.output import check_folder, print_json, print_result, say
@@ -39,6 +39,7 @@ __all__ = [
     "check_folder",
     "damage_lines",
     "file_or_name",
+    "hint_of_unit",
     "marks_of",
     "named_values",
     "number",

@@ -3,7 +3,9 @@
 import re
 from collections.abc import Mapping, Sequence
 
-_WITH_UNIT = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*\[([^\]]+)\]")
+_NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+_WITH_UNIT = re.compile(_NUMBER + r"\s*\[([^\]]+)\]")
+_BARE_UNIT = re.compile(r"(.+=)\s*" + _NUMBER + r"\s*([^\d\s\[].*)")
 
 
 def named_values(
@@ -28,9 +30,15 @@ def named_values(
         number = number_in_unit(f"{option} {text}", name, value, units)
         if number is None:
             expected = f"expected NAME=VALUE such as {example}"
-            raise ModelError(f"{option}: found {text!r}, {expected}")
+            raise ModelError(f"{option}: found {text!r}, {expected}{hint_of_unit(text)}")
         found[name] = number
     return found
+
+
+def hint_of_unit(text: str) -> str:
+    """What to add to an error where a text has a unit without brackets, as m=141 g; or nothing."""
+    bare = _BARE_UNIT.fullmatch(text.strip())
+    return f"; a unit stands in brackets: '{bare[1]}{bare[2]}[{bare[3]}]'" if bare else ""
 
 
 def number_in_unit(option: str, name: str, value: str, units: Mapping[str, str]) -> float | None:

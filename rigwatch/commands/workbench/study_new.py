@@ -11,6 +11,7 @@ from rigwatch.commands.common import (
     ask_for_logs,
     can_ask,
     file_or_name,
+    hint_of_unit,
     number_in_unit,
     print_json,
     say,
@@ -92,9 +93,16 @@ def run(arguments: argparse.Namespace) -> int:
     for remark in remarks:
         say(remark)
     tried, elective = suitable(study)
-    rarer = f", {len(elective)} rarer ones with whole_library = true" if elective else ""
-    print(f"  {len(tried)} effects suit its ports{rarer}; next: rigwatch explain {study.folder}")
+    print(f"  {_effects(len(tried), len(elective))}; next: rigwatch explain {study.folder}")
     return 0
+
+
+def _effects(usual: int, rarer: int) -> str:
+    """How many effects suit the model's ports, and when the rarer ones are tried."""
+    if not rarer:
+        return f"{usual} effects suit its ports"
+    tried = f"{usual} are tried at once, {rarer} rarer ones if none of those explains the error"
+    return f"{usual + rarer} effects suit its ports: {tried}"
 
 
 def _ask(arguments: argparse.Namespace) -> None:
@@ -174,7 +182,7 @@ def _known(given: list[str], model: str) -> "_Known":
             (known.of_log.setdefault(log, {}) if log else known.start)[name] = number
         elif log or not _NUMBER.fullmatch(value):
             expected = "NAME=VALUE such as R=2.0, or the name of a number that each log states"
-            raise ModelError(f"--set: found {text!r}, expected {expected}")
+            raise ModelError(f"--set: found {text!r}, expected {expected}{hint_of_unit(text)}")
         else:
             known.stated[name] = value
     return known

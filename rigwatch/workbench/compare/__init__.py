@@ -27,6 +27,7 @@ from rigwatch.workbench.compare.shared_fit import (
     fitted_beside_healthy,
     refuse_what_spoils,
     shared_bench,
+    spoils_healthy,
 )
 from rigwatch.workbench.compare.uncertainty_budget import added_variances, apparent_strength
 from rigwatch.workbench.compare.unweighed import unweighed
@@ -58,6 +59,7 @@ __all__ = [
     "refuse_what_spoils",
     "sample_numbers",
     "shared_bench",
+    "spoils_healthy",
     "unweighed",
     "with_base",
     "with_hold_decided",

@@ -9,7 +9,7 @@ from rigwatch.physics.engine.fit import Fit, with_effects
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.beside_healthy import may_share
 from rigwatch.workbench.compare.preparation import Bench, beside_healthy
-from rigwatch.workbench.fit import fit_model
+from rigwatch.workbench.fit import Fitted, fit_model
 from rigwatch.workbench.ranking import MATERIAL, STEP, Ranked, difference, refit
 
 AS_BEFORE = 1.05
@@ -35,12 +35,23 @@ def refuse_what_spoils(both: Bench, rows: Iterable[Ranked]) -> None:
         both: of `shared_bench`.
         rows: of its ranking.
     """
-    assert both.bare is not None
-    first = len(with_effects(both.study.model, both.data.train))
-    most = AS_BEFORE * _size(both.bare.train, 0)
     for row in rows:
-        if row.accepted and row.fitted is not None and _size(row.fitted.train, first) > most:
+        if row.accepted and row.fitted is not None and spoils_healthy(both, row.fitted):
             row.accepted, row.reason = False, REFUSED
+
+
+def spoils_healthy(bench: Bench, fitted: Fitted) -> bool:
+    """Whether what is fitted beside the healthy recording no longer describes that.
+
+    Args:
+        bench: the study; nothing is spoilt if its training does not hold the healthy recording.
+        fitted: its model with effects.
+    """
+    if bench.study.model.presence is None:
+        return False
+    assert bench.bare is not None
+    first = len(with_effects(bench.study.model, bench.data.train))
+    return _size(fitted.train, first) > AS_BEFORE * _size(bench.bare.train, 0)
 
 
 def fitted_beside_healthy(bench: Bench, row: Ranked) -> tuple[Bench, Ranked] | None:

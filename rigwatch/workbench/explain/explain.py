@@ -125,7 +125,7 @@ def explained(bench: Bench, progress: Progress = no_progress) -> Explained:
 
 
 def _beside_healthy(first: Explained, progress: Progress) -> Explained:
-    """The explanation; with the healthy recording in the training if only that names an effect.
+    """The explanation; with the healthy recording in the training if that names more.
 
     The comparison remains that of the study's own training.
     """
@@ -140,11 +140,17 @@ def _beside_healthy(first: Explained, progress: Progress) -> Explained:
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
     refuse_what_spoils(bench, rows)
     second = _explained_once(bench, progress, rows)
-    if second.explanation.verdict != "missing_effect":
+    if not _names_more(first.explanation, second.explanation):
         return first
     own, found = first.explanation.comparison, unless_two(second.explanation)
     compared = replace(own, remarks=found.comparison.remarks)
     return replace(second, bench=first.bench, explanation=replace(found, comparison=compared))
+
+
+def _names_more(first: Explanation, second: Explanation) -> bool:
+    """Whether a second look names an effect, or two at once where the first knows none."""
+    two = first.verdict == "unknown_effect" and bool(second.also)
+    return second.verdict == "missing_effect" or two
 
 
 def _on_closer_base(first: Explained, progress: Progress) -> Explained:
@@ -500,10 +506,12 @@ def _by_pairs(bench: Bench, rows: list[Ranked], verdict: Verdict, progress: Prog
         along and leaves_much(bench.base, bench.floor, verdict)
     )
     some = along and not bench.study.model.rough and leaves_some(bench.base, bench.floor, verdict)
-    if verdict.best is None or not (much or some):
+    best, shared = verdict.best, bench.study.model.presence is not None
+    if not (much or some) or (best is None and not shared):
         return verdict
     size = "a large residual" if much else "a part of the residual"
-    progress(f"{verdict.best.label} leaves {size}: trying two effects at once")
+    alone = "no effect is accepted alone" if best is None else f"{best.label} leaves {size}"
+    progress(f"{alone}: trying two effects at once")
     return two_effects(bench, rows, verdict, progress, tolerant=much)
 
 

@@ -47,6 +47,7 @@ from rigwatch.workbench.ranking.refitting import (
     own_floor,
     refit,
     refit_from_given,
+    values_of_base,
 )
 from rigwatch.workbench.ranking.same_drive import denied_sensors
 from rigwatch.workbench.ranking.scoring import rank_all, rank_only, score_all, scored
@@ -97,6 +98,7 @@ __all__ = [
     "select_for_fit",
     "shapes_of",
     "suitable",
+    "values_of_base",
     "vanishes",
     "vanishing_shape",
     "with_refinements",

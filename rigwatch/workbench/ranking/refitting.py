@@ -42,7 +42,7 @@ def refit(
         fitting: `fit_model` accepts the first minimum, `fit_with_retry` also searches elsewhere.
     """
     fits, failures = list[Fitted](), list[str]()
-    ended, given = _ended(study, base) | row.begin(), _given_of_open(study, data, base)
+    ended, given = values_of_base(study, base) | row.begin(), _given_of_open(study, data, base)
     for placement in orders_at_port(study, base, row):
         placements = (*base.placements, placement)
         for start in (ended, ended | given) if given else (ended,):
@@ -60,8 +60,8 @@ def refit(
     judge_fit(base, row)
 
 
-def _ended(study: Study, base: Fitted) -> dict[str, float]:
-    """Values that the base model ended with.
+def values_of_base(study: Study, base: Fitted) -> dict[str, float]:
+    """Values from which a fit with effects begins: those that the base model ended with.
 
     Where parameters are shared with a recording without effects, they begin where that alone has
     them: the base model's have followed what is missing in the other.

@@ -132,9 +132,10 @@ def _not_fitted(logs: Logs, model: Model) -> list[str]:
     fixed = [n for n, p in model.parameters.items() if p.fixed and n not in given]
     if not fixed:
         return []
+    differ = f", or --set LOG:{fixed[0]}=VALUE where logs differ" if len(logs.data) > 1 else ""
     return [
         f"{', '.join(fixed)}: not fitted, taken from the model file; set known values with"
-        f" --set {fixed[0]}=VALUE"
+        f" --set {fixed[0]}=VALUE{differ}"
     ]
 
 
@@ -201,5 +202,9 @@ def _in_words(logs: Logs, part: Part) -> str:
     name = logs.data[part.recording].name
     if not part.start and part.end == float("inf"):
         return name
-    until = f"to {part.end:.4g} s" if part.end != float("inf") else "on"
-    return f"{name} from {part.start:.4g} s {until}"
+    ends = part.end != float("inf")
+    until = f"to {part.end:.4g} s" if ends else "on"
+    # A single log is cut for its split, of several the ends at rest are left out.
+    rest = [where for where, left_out in (("before", part.start), ("after", ends)) if left_out]
+    why = f", as nothing moves {' or '.join(rest)}" if len(logs.data) > 1 else ""
+    return f"{name} from {part.start:.4g} s {until}{why}"

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.workbench.data.noise.error_spectrum import ErrorSpectrum, expected_error
+from rigwatch.workbench.data.noise.error_spectrum import ErrorSpectrum, expected_error, that_count
 
 RANDOM = np.random.default_rng(3)
 LENGTH = 4096
@@ -37,13 +37,13 @@ def expected() -> ErrorSpectrum:
 def test_an_error_that_grows_with_the_motion_in_its_band_is_its_own() -> None:
     left = noise(0.01, *SLOW) + noise(0.15, *FAST)
 
-    assert expected().beyond(left[None], RMS) < 0.1 * (left.std() / RMS[0]) ** 2
+    assert expected().beyond(left[None], RMS).sum() < 0.1 * (left.std() / RMS[0]) ** 2
 
 
 def test_the_same_error_where_the_healthy_motion_checks_the_model_is_not() -> None:
     left = noise(0.15, *SLOW) + noise(0.03, *FAST)
 
-    assert expected().beyond(left[None], RMS) > 15
+    assert expected().beyond(left[None], RMS).sum() > 15
 
 
 def test_the_bands_of_a_thinned_error_are_those_of_the_motion_at_these_frequencies() -> None:
@@ -56,7 +56,7 @@ def test_the_bands_of_a_thinned_error_are_those_of_the_motion_at_these_frequenci
     assert found is not None
     own = noise(0.01, *SLOW) + noise(0.15, *FAST)
 
-    assert found.beyond(own[None], RMS) < 0.15 * (own.std() / RMS[0]) ** 2
+    assert found.beyond(own[None], RMS).sum() < 0.15 * (own.std() / RMS[0]) ** 2
 
 
 def test_samples_that_do_not_count_hold_nothing() -> None:
@@ -65,8 +65,8 @@ def test_samples_that_do_not_count_hold_nothing() -> None:
     calm = np.ones((1, LENGTH), np.bool_)
     calm[0, 1000:1010] = False
 
-    assert expected().beyond(left[None], RMS) > 1
-    assert expected().beyond(left[None], RMS, calm) < 0.1
+    assert expected().beyond(left[None], RMS).sum() > 1
+    assert expected().beyond(left[None], RMS, calm).sum() < 0.1
 
 
 @pytest.mark.parametrize("resting", [0.0, 0.6])
@@ -79,10 +79,25 @@ def test_invalid_samples_hold_no_energy_and_take_none_away(resting: float, *, wi
     calm = (place < resting if within else np.zeros(LENGTH, np.bool_)) | (place >= 0.8)
     left = np.where(invalid[:, None], np.nan, tone)
 
-    whole = expected().beyond(tone[None], RMS)
-    assert expected().beyond(left[None], RMS, calm[None]) == pytest.approx(whole, rel=0.15)
+    whole = expected().beyond(tone[None], RMS).sum()
+    assert expected().beyond(left[None], RMS, calm[None]).sum() == pytest.approx(whole, rel=0.15)
 
 
 def test_a_short_recording_has_no_spectrum() -> None:
     assert expected_error(ERROR[None, :500], HEALTHY, CORNERED) is None
-    assert expected().beyond(ERROR[None, :500], RMS) == np.inf
+    assert expected().beyond(ERROR[None, :500], RMS).sum() == np.inf
+
+
+def test_what_rings_above_the_bands_of_what_is_missing_does_not_count() -> None:
+    missing = noise(1.0, *SLOW) + noise(0.2, *FAST)
+    counts = that_count(expected().beyond(missing[None], RMS))
+    ringing, other = (expected().beyond(noise(0.5, *each)[None], RMS) for each in (FAST, SLOW))
+
+    assert ringing[counts].sum() < 0.1 * ringing.sum()
+    assert other[counts].sum() > 0.9 * other.sum()
+
+
+def test_what_is_missing_at_high_frequencies_counts_there() -> None:
+    missing = noise(1.0, *SLOW) + noise(0.5, *FAST)
+
+    assert that_count(expected().beyond(missing[None], RMS)).sum() > 9

@@ -131,6 +131,19 @@ def test_what_makes_the_healthy_recording_its_own_is_no_rival(tmp_path: Path) ->
     assert found.comparison.held_out_error == own, "the study's own comparison remains"
 
 
+def test_two_effects_of_which_none_is_accepted_alone_are_told_with_doubt(tmp_path: Path) -> None:
+    made = bench(tmp_path, stiffer=60.0, weaker=0.08)
+    alone = _explained_once(made, no_progress).explanation
+    assert (alone.verdict, alone.also) == ("undetermined", []), alone.text
+
+    found = explained(made).explanation
+
+    assert found.verdict == "undetermined", found.text
+    best = found.ranking[0]
+    assert (f"{best.effect}@{best.port}", found.also) == ("linear_stiffness@load", ["gain@drive"])
+    assert found.text.startswith("likely, not certain: linear_stiffness@load is missing, and gain@")
+
+
 @pytest.mark.parametrize("weaker", [-0.08, 0.08])
 def test_a_motor_that_changed_is_not_called_a_spring(tmp_path: Path, weaker: float) -> None:
     found = explained(bench(tmp_path, lines=CLOSE, weaker=weaker)).explanation

@@ -1,10 +1,12 @@
 """The split that is proposed excites both sides, and says of an input that it never changes."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from rigwatch.commands import main
 from rigwatch.workbench.compare.compare import compare
 from rigwatch.workbench.data import proposed_split, unchanging
 from rigwatch.workbench.data.columns import Columns
@@ -13,6 +15,17 @@ from tests.workbench.machine import studied
 from tests.workbench.studies.test_own_model import PORT, SPEED, UNITS, run
 
 WIND = 'inputs.w = { unit = "rad/s^2" }\n'
+
+
+BLOCK = """
+name = "block"
+summary = "A block that is heated."
+inputs.u = { unit = "1" }
+states.T = { unit = "K", derivative = "(G*u - T)/tau", measured = "T" }
+parameters.G = { value = 1.0, unit = "K", fixed = true, low = 0.0 }
+parameters.tau = { value = 100.0, unit = "s", low = 1.0 }
+outputs.T = { unit = "K", expression = "T" }
+"""
 
 
 def logged(u: np.ndarray) -> Columns:
@@ -60,6 +73,23 @@ def test_a_log_ends_where_the_machine_rests_not_where_its_input_does(noise: floa
     ):
         assert part.start == 0.0 or 100 < part.start < 200
         assert 1000 < part.end < 3000
+
+
+def test_why_a_part_of_a_log_is_left_out_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "block.toml").write_text(BLOCK)
+    for seed in (0, 1):
+        table = warmed(seed, 0.0).values
+        rows = zip(np.arange(6000.0), table["u"], table["T"], strict=True)
+        text = "\n".join(f"{t:g},{u:g},{warm:.6g}" for t, u, warm in rows)
+        (tmp_path / f"run{seed}.csv").write_text(f"time_s,u [1],T [K]\n{text}\n")
+    logs = [f"{tmp_path}/run{seed}.csv" for seed in (0, 1)]
+    made = ["study", "new", f"{tmp_path}/study", "--model", f"{tmp_path}/block.toml", "--data"]
+    assert main([*made, *logs]) == 0
+    said = capsys.readouterr()
+    assert re.search(r"run\d.csv from \S+ s to \S+ s, as nothing moves before or after", said.err)
+    assert "set known values with --set G=VALUE, or --set LOG:G=VALUE where logs differ" in said.err
 
 
 @pytest.mark.parametrize(("logs", "held_out"), [(2, 1), (5, 1), (6, 2), (8, 2), (16, 4)])

@@ -9,6 +9,7 @@ applied in sequence, in the order of placement unless they are placed ahead. A m
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 from typing import TypeVar
 
 import sympy
@@ -272,16 +273,32 @@ class _Composer:
         waiting = [name for kind in kinds for name, port in ports.items() if port.kind == kind]
         values = {}
         while waiting:
-            name = next((n for n in waiting if self._is_ready(ports[n], waiting)), waiting[0])
+            ready = (n for n in waiting if self._is_ready(ports[n], waiting))
+            # Of those that are never ready the one in the wrong is told, not one that waits for it.
+            circular = (n for n in waiting if self._needs_itself(n))
+            name = next(chain(ready, circular, waiting))
             values[name] = self._enter(name, ports[name])
             waiting.remove(name)
         return values
 
     def _is_ready(self, port: Port, waiting: list[str]) -> bool:
         """Whether all that a port's signal and variables use is defined."""
+        return not self._names_at(port) & {*self._waiting, *waiting}
+
+    @staticmethod
+    def _names_at(port: Port) -> set[str]:
+        """What a port's signal and variables use."""
         texts = [own.expression for own in port.variables.values()]
-        names = {port.signal}.union(*(names_in(text, "variable") for text in texts))
-        return not names & {*self._waiting, *waiting}
+        return {port.signal}.union(*(names_in(text, "variable") for text in texts))
+
+    def _needs_itself(self, name: str) -> bool:
+        """Whether a port's signal or variables use what enters there, also through quantities."""
+        found, seen = self._names_at(self._model.ports[name]), set[str]()
+        while found:
+            seen |= found
+            texts = [self._model.quantities[n].expression for n in found & {*self._waiting}]
+            found = set[str]().union(*(names_in(text, "quantity") for text in texts)) - seen
+        return name in seen
 
     def _enter(self, name: str, port: Port) -> sympy.Expr:
         """A port with its effects, added to the scope."""

@@ -9,6 +9,10 @@ error e_h(f), the healthy reading y_h(f) and the reading y(f) to be explained, a
 
 is the error to be expected of a model that is as wrong, relative to the motion, as on the healthy
 recording. What an effect leaves within e(f) does not speak against it.
+
+Nor does what it leaves in the highest bands, if they hold little of what is to be explained: there
+sensors on their mounts and the structure ring after each jump of a force, as of friction that
+reverses, and a healthy motion without jumps has not shown it.
 """
 
 from dataclasses import dataclass
@@ -22,6 +26,8 @@ SEGMENT = 256
 """Samples of a segment of a power spectrum."""
 LEAST_SEGMENTS = 8
 """Segments, halfway overlapping, below which a spectrum is too uncertain."""
+LITTLE = 0.1
+"""Share of the energy to be explained that the highest bands may hold and not count."""
 EDGES = np.array([0, 4, 6, 8, 11, 16, 23, 32, 45, 64, 91, SEGMENT // 2 + 1])
 """First bin of each band: half an octave wide, the lowest broader."""
 
@@ -36,7 +42,9 @@ class ErrorSpectrum:
 
     energy: FloatArray
 
-    def beyond(self, residuals: FloatArray, rms: FloatArray, at: BoolArray | None = None) -> float:
+    def beyond(
+        self, residuals: FloatArray, rms: FloatArray, at: BoolArray | None = None
+    ) -> FloatArray:
         """Energy that residuals hold beyond the model's own error, in units of the noise floor.
 
         Args:
@@ -45,14 +53,25 @@ class ErrorSpectrum:
             at: samples that count, shape (windows, length); all if None.
 
         Returns:
-            Infinite where their spectrum cannot be found.
+            That in each band, the mean over the outputs, shape (bands,); infinite where their
+            spectrum cannot be found.
         """
         counted = residuals if at is None else np.where(at[..., None], residuals, 0.0)
         found = band_energy(counted)
         if found is None:
-            return np.inf
+            return np.full(len(self.energy), np.inf)
         share = 1.0 if at is None else _share(residuals, at)
-        return float(np.mean(np.maximum(found / share - self.energy, 0.0).sum(axis=0) / rms**2))
+        return np.asarray(np.mean(np.maximum(found / share - self.energy, 0.0) / rms**2, axis=1))
+
+
+def that_count(energy: FloatArray) -> BoolArray:
+    """The bands that count: all but the highest that together hold at most `LITTLE` of the energy.
+
+    Args:
+        energy: to be explained in each band, shape (bands,).
+    """
+    above = np.cumsum(energy[::-1])[::-1]
+    return np.asarray(above > LITTLE * above[0])
 
 
 def _share(residuals: FloatArray, at: BoolArray) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 from rigwatch.physics.engine.fit import Fit, Recording, apart
 from rigwatch.physics.transfer import period_by_correlation, shortest_period
 from rigwatch.wire.arrays import BoolArray, FloatArray
-from rigwatch.workbench.data.noise.error_spectrum import ErrorSpectrum
+from rigwatch.workbench.data.noise.error_spectrum import ErrorSpectrum, that_count
 from rigwatch.workbench.data.noise.quietest_band import quietest_band
 from rigwatch.workbench.data.noise.rounding import rounding
 from rigwatch.workbench.data.noise.stated import stated_rms
@@ -120,12 +120,15 @@ class NoiseFloor:
             before, after, at: as in `left_over`.
 
         Returns:
-            Infinite if the model's own error is not known.
+            Infinite if the model's own error, or a fit's, is not known by frequency.
         """
         if self.own_error is None:
             return math.inf
         left, above = (self.own_error.beyond(f.residuals, self.rms, at) for f in (after, before))
-        return max(left - BY_CHANCE, 0.0) / max(above, 1e-12)
+        if not np.isfinite([left, above]).all():
+            return math.inf
+        counts = that_count(above)
+        return max(float(left[counts].sum()) - BY_CHANCE, 0.0) / max(float(above.sum()), 1e-12)
 
 
 def from_residual(

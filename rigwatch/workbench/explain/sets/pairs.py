@@ -21,7 +21,7 @@ import numpy as np
 from rigwatch.physics.engine.compile import side_by_side
 from rigwatch.physics.engine.score import ALIKE
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.compare import Bench
+from rigwatch.workbench.compare import Bench, spoils_healthy
 from rigwatch.workbench.explain.rough_verdict import much_left
 from rigwatch.workbench.explain.verdict import Verdict, Word, judge
 from rigwatch.workbench.fit import Fitted, fit_model
@@ -34,6 +34,7 @@ from rigwatch.workbench.ranking import (
     refinements,
     refit,
     same_family,
+    values_of_base,
 )
 
 LIKELY = 0.7
@@ -153,7 +154,7 @@ def _fitted_pair(bench: Bench, pair: Pair) -> Fitted | None:
     """The model with both effects; None if it cannot be fitted."""
     base = bench.base
     placements = (*base.placements, pair.one.placement, pair.other.placement)
-    start = base.train.values() | pair.start
+    start = values_of_base(bench.study, base) | pair.start
     try:
         return fit_model(bench.study, bench.data, placements, start, base.train.scale, base=base)
     except ModelError:
@@ -205,6 +206,7 @@ def _explaining(
         (pair, fitted)
         for pair, fitted in fits
         if floor.reached(fitted.held_out) or (tolerant and not much_left(bench.base, floor, fitted))
+        if not spoils_healthy(bench, fitted)
     ]
 
 
