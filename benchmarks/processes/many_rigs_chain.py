@@ -30,6 +30,7 @@ from benchmarks.archives.recordings import MODEL, RATE, ROOT
 from benchmarks.processes.many_devices import sent_times
 from benchmarks.processes.many_rigs import repeat_for
 from rigwatch.wire.bus import Bus, SharedLinks, connect
+from rigwatch.wire.host import MONITOR, prepare_for_real_time, raise_priority
 from rigwatch.wire.messages import ESTIMATES
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.session import open_session
@@ -97,6 +98,9 @@ def measured(folder: Path, count: int, seconds: float) -> Found:
     """Run the chain and measure it."""
     paths = rig_files(folder, count)
     with started(folder, paths) as processes:
+        # As a late subscriber would be measured with them: once they run, as they would inherit it.
+        prepare_for_real_time()
+        raise_priority(MONITOR)
         links = SharedLinks(count)
         heard_of = paths[:: -(-count // MOST_HEARD)]
         buses = [connect(load_rig(path), "subscriber", 60.0, links) for path in heard_of]

@@ -60,6 +60,8 @@ FeedOf = Callable[..., Feed]
 HEALTH_EVERY = 1.0
 UNSETTLED_NS = 2_000_000_000
 """Age of messages that count as recorded once the disk has been written [ns]."""
+FLUSH = 0.5
+"""Time until what was received is on the disk, where the configuration says nothing [s]."""
 _OF_FLUSH = 0.8
 """Share of the flush time that one loop iteration waits; the rest is for the disk."""
 
@@ -269,6 +271,7 @@ def record(
     *,
     disks: DiskTurns | None = None,
     feed_of: FeedOf = Feed,
+    flush: float = FLUSH,
 ) -> Path:
     """Record until `stop` is set, telling `pulse` of each turn; returns the session's folder.
 
@@ -278,6 +281,7 @@ def record(
         pulse: is told of each turn.
         disks: those of the process, if it records several rigs.
         feed_of: see `Recorder`.
+        flush: time until what was received is on the disk, if the configuration says nothing [s].
 
     Raises:
         SessionError: another process records this rig into the same folder.
@@ -290,7 +294,7 @@ def record(
         recorder = Recorder(config, run, bus, catch_up, feed_of=feed_of)
         pulse.ready(f"recording to {recorder.store.folder}")
         turn = _Turn(recorder, kept, bus, pulse)
-        every = recorder.settings.flush * _OF_FLUSH
+        every = (recorder.settings.flush or flush) * _OF_FLUSH
         try:
             if disks is None:
                 take_turns(turn, every, stop)

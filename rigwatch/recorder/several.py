@@ -11,7 +11,14 @@ from pathlib import Path
 
 from rigwatch.recorder.disk_turns import DiskTurns
 from rigwatch.recorder.feed import Feed
-from rigwatch.recorder.process import PROCESS, FeedOf, describe_run, process_name, record
+from rigwatch.recorder.process import (
+    FLUSH,
+    PROCESS,
+    FeedOf,
+    describe_run,
+    process_name,
+    record,
+)
 from rigwatch.wire.bus import SharedLinks, joined
 from rigwatch.wire.host import (
     Heartbeat,
@@ -28,6 +35,8 @@ from rigwatch.wire.several_rigs import valid_rigs
 
 MANY = 32
 """Rigs from which on blocks are read by a compiled call: the compiler takes 130 MB once."""
+FLUSH_OF_MANY = 0.9
+"""What most of their cost goes with is the turns of each rig: they take about half as many [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +47,14 @@ class _Process:
         notes: for their descriptions.
         links: to routers.
         disks: their turns.
+        flush: time until what was received is on the disk, if a configuration says nothing [s].
         folders: of the last session of each, written at its end.
     """
 
     notes: str
     links: SharedLinks
     disks: DiskTurns
+    flush: float
     folders: dict[Path, Path] = field(default_factory=dict)
 
 
@@ -56,7 +67,14 @@ def work_of(path: Path, feed_of: FeedOf, process: _Process) -> Work:
             if bus is not None:
                 run = describe_run(path, config, process.notes)
                 process.folders[path] = record(
-                    config, run, bus, stop, pulse, disks=process.disks, feed_of=feed_of
+                    config,
+                    run,
+                    bus,
+                    stop,
+                    pulse,
+                    disks=process.disks,
+                    feed_of=feed_of,
+                    flush=process.flush,
                 )
 
     return work
@@ -79,7 +97,8 @@ def run_several(paths: list[Path], stop: threading.Event, notes: str = "") -> li
     valid_rigs(paths)  # a wrong file is named by its rig's thread
     keep_memory_tidy(stop)
     links = SharedLinks(len(paths))
-    process = _Process(notes, links, DiskTurns(links.together, links.collect))
+    flush = FLUSH if len(paths) < MANY else FLUSH_OF_MANY
+    process = _Process(notes, links, DiskTurns(links.together, links.collect), flush)
     parts = [
         Part(str(path), work_of(path, feed, process), partial(used, path))
         for path, feed in zip(paths, feeds, strict=True)

@@ -256,7 +256,13 @@ class RecorderSection(Section, frozen=True):
             "sample [days]; 0 for one session until the recorder stops",
         ),
     ] = 0.0
-    flush: Annotated[float, Meta(gt=0, le=0.5, description="time between flushes [s]")] = 0.5
+    flush: Annotated[
+        Annotated[float, Meta(gt=0, le=0.9)] | None,
+        Meta(
+            description="longest time until what was received is on the disk [s]; 0.5 if it is not"
+            " given, 0.9 in a process that records 32 rigs or more"
+        ),
+    ] = None
     remote: Annotated[
         bool,
         Meta(

@@ -5,7 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from rigwatch.recorder.disk_turns import DiskTurns
+from rigwatch.recorder.disk_turns import DiskTurns, Turn
+from rigwatch.recorder.process import FLUSH, describe_run, record
+from rigwatch.recorder.several import FLUSH_OF_MANY
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.host import Heartbeat
+from tests.bus.rig import TestRig
 from tests.waiting import PATIENCE, eventually
 
 EVERY = 0.005
@@ -101,3 +106,29 @@ def test_a_disk_that_hangs_delays_no_recording_on_another(tmp_path: Path) -> Non
     go_on(here, there)
     here.finish()
     there.finish()
+
+
+class Noted(DiskTurns):
+    """Turns that note how often they are asked for."""
+
+    def serve(self, turn: Turn, folder: Path, every: float, stop: threading.Event) -> None:
+        self.every = every
+        super().serve(turn, folder, every, stop)
+
+
+@pytest.mark.parametrize(
+    ("written", "flush", "every"),
+    [("", FLUSH, 0.4), ("", FLUSH_OF_MANY, 0.72), ("flush = 0.1\n", FLUSH_OF_MANY, 0.08)],
+    ids=["few", "many", "as the file says"],
+)
+def test_a_recording_among_many_is_flushed_less_often_unless_its_file_says(
+    written: str, flush: float, every: float, tmp_path: Path
+) -> None:
+    rig = TestRig(tmp_path, f'\n[recorder]\nfolder = "{tmp_path / "sessions"}"\n{written}')
+    bus, ended, turns = MemoryNetwork().bus("bench", "recorder"), threading.Event(), Noted()
+    ended.set()
+    run = describe_run(rig.path, rig.config)
+
+    record(rig.config, run, bus, ended, Heartbeat("recorder"), disks=turns, flush=flush)
+
+    assert turns.every == pytest.approx(every)
