@@ -11,6 +11,7 @@ runs it with other numbers.
 """
 
 import json
+import os
 import re
 import signal
 import subprocess
@@ -19,7 +20,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,7 +31,7 @@ from benchmarks.archives.recordings import MODEL, RATE, ROOT
 from benchmarks.processes.many_devices import sent_times
 from benchmarks.processes.many_rigs import repeat_for
 from rigwatch.wire.bus import Bus, SharedLinks, connect
-from rigwatch.wire.host import MONITOR, prepare_for_real_time, raise_priority
+from rigwatch.wire.host import MONITOR
 from rigwatch.wire.messages import ESTIMATES
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.session import open_session
@@ -78,7 +79,7 @@ def row(count: int, seconds: float) -> Row:
     """The row of so many rigs."""
     with tempfile.TemporaryDirectory(prefix="rigwatch-chain-") as name:
         found = measured(Path(name), count, seconds)
-    cores = ", ".join(f"{name} {found.core[name]:.1f}" for name in (*CHAIN, "router"))
+    cores = ", ".join(f"{name} {found.core[name]:.2f}" for name in (*CHAIN, "router"))
     memory = ", ".join(f"{name} {found.memory[name]:.0f}" for name in (*CHAIN, "router"))
     return Row(
         f"daq, monitor and recorder of {count} rig{'s' * (count > 1)} at {RATE} Hz",
@@ -98,9 +99,6 @@ def measured(folder: Path, count: int, seconds: float) -> Found:
     """Run the chain and measure it."""
     paths = rig_files(folder, count)
     with started(folder, paths) as processes:
-        # As a late subscriber would be measured with them: once they run, as they would inherit it.
-        prepare_for_real_time()
-        raise_priority(MONITOR)
         links = SharedLinks(count)
         heard_of = paths[:: -(-count // MOST_HEARD)]
         buses = [connect(load_rig(path), "subscriber", 60.0, links) for path in heard_of]
@@ -111,7 +109,8 @@ def measured(folder: Path, count: int, seconds: float) -> Found:
             heard.take()
             return len(list((folder / "sessions").glob("*/*.mcap"))) >= count
 
-        assert wait_until(recorded, BEGIN, 0.05), "not all recordings have begun"
+        assert wait_until(recorded, BEGIN, 0.5), "not all recordings have begun"
+        hear_at_once()
         repeat_for(SETTLE, heard.take)
         heard.forget()
         before, began = _cpu(processes), time.monotonic()
@@ -155,6 +154,13 @@ class Estimates:
         """Whether every rig has been judged."""
         self.take()
         return min(self._latest) >= 0
+
+
+def hear_at_once() -> None:
+    """Let no thread of this process wait for the processor: its delay would be taken for theirs."""
+    for thread in Path("/proc/self/task").iterdir():
+        with suppress(OSError):
+            os.sched_setscheduler(int(thread.name), os.SCHED_RR, os.sched_param(MONITOR))
 
 
 def _cpu(processes: dict[str, psutil.Process]) -> dict[str, float]:
