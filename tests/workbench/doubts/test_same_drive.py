@@ -60,6 +60,7 @@ def in_loop(gain: float) -> Recording:
 
 
 @pytest.mark.long
+@pytest.mark.nightly
 def test_faults_of_sensors_that_another_denies_are_not_fitted_and_say_why() -> None:
     rows = ranked(data(STRONG))
 

@@ -80,7 +80,7 @@ def test_why_a_part_of_a_log_is_left_out_is_said(
 ) -> None:
     (tmp_path / "block.toml").write_text(BLOCK)
     for seed in (0, 1):
-        table = warmed(seed, 0.0).values
+        table = warmed(seed, 0.05).values
         rows = zip(np.arange(6000.0), table["u"], table["T"], strict=True)
         text = "\n".join(f"{t:g},{u:g},{warm:.6g}" for t, u, warm in rows)
         (tmp_path / f"run{seed}.csv").write_text(f"time_s,u [1],T [K]\n{text}\n")
@@ -88,7 +88,7 @@ def test_why_a_part_of_a_log_is_left_out_is_said(
     made = ["study", "new", f"{tmp_path}/study", "--model", f"{tmp_path}/block.toml", "--data"]
     assert main([*made, *logs]) == 0
     said = capsys.readouterr()
-    assert re.search(r"run\d.csv from \S+ s to \S+ s, as nothing moves before or after", said.err)
+    assert re.search(r"run\d.csv from 0 s to \S+ s, as nothing moves after", said.err)
     assert "set known values with --set G=VALUE, or --set LOG:G=VALUE where logs differ" in said.err
 
 

@@ -4,6 +4,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.adequacy import unexcited
@@ -88,6 +89,7 @@ def wound(volts: np.ndarray, seed: int) -> dict[str, np.ndarray]:
     }
 
 
+@pytest.mark.nightly
 def test_an_inductance_too_small_to_show_is_no_reason_to_refuse(tmp_path: Path) -> None:
     generator, t = np.random.default_rng(4), 0.005 * np.arange(2600)
     steps = np.repeat(generator.uniform(-10, 10, 60), generator.integers(50, 160, 60))[:2600]

@@ -40,6 +40,7 @@ def test_a_fault_is_undone_in_position_and_speed(
     assert found.inputs[5:-5, 2] == pytest.approx(TRUE[1][5:-5], abs=2e-3)
 
 
+@pytest.mark.nightly
 def test_gain_of_the_position_sensor_is_named_and_nothing_else(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

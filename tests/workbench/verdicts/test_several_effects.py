@@ -83,6 +83,7 @@ def test_two_simple_effects_are_not_taken_for_one_with_a_shape():
     assert "stribeck@load" not in verdict.members
 
 
+@pytest.mark.nightly
 def test_an_effect_with_a_shape_of_its_own_is_not_taken_for_two_simple_ones():
     _, verdict = ranking(with_few_effects(hiding("stribeck"), "stribeck", "quadratic_drag"))
     assert verdict.word == "missing_effect"
