@@ -36,7 +36,10 @@ from rigwatch.wire.several_rigs import valid_rigs
 MANY = 32
 """Rigs from which on blocks are read by a compiled call: the compiler takes 130 MB once."""
 FLUSH_OF_MANY = 0.9
-"""What most of their cost goes with is the turns of each rig: they take about half as many [s]."""
+"""Time until what was received is on the disk, if the configuration of so many says nothing [s].
+
+Most of their cost is each rig's turns, of which there are then about half as many.
+"""
 
 
 @dataclass(frozen=True, eq=False)

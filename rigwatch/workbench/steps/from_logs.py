@@ -200,9 +200,9 @@ def _inline(values: Mapping[str, float]) -> str:
 
 def _in_words(logs: Logs, part: Part) -> str:
     name = logs.data[part.recording].name
-    if not part.start and part.end == float("inf"):
-        return name
     ends = part.end != float("inf")
+    if not (part.start or ends):
+        return name
     until = f"to {part.end:.4g} s" if ends else "on"
     # A single log is cut for its split, of several the ends at rest are left out.
     rest = [where for where, left_out in (("before", part.start), ("after", ends)) if left_out]

@@ -59,7 +59,6 @@ def in_loop(gain: float) -> Recording:
     return Recording(1 / RATE, table[:, :1], table[:, 1:])
 
 
-@pytest.mark.long
 @pytest.mark.nightly
 def test_faults_of_sensors_that_another_denies_are_not_fitted_and_say_why() -> None:
     rows = ranked(data(STRONG))

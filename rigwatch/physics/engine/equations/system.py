@@ -283,22 +283,16 @@ class _Composer:
 
     def _is_ready(self, port: Port, waiting: list[str]) -> bool:
         """Whether all that a port's signal and variables use is defined."""
-        return not self._names_at(port) & {*self._waiting, *waiting}
-
-    @staticmethod
-    def _names_at(port: Port) -> set[str]:
-        """What a port's signal and variables use."""
         texts = [own.expression for own in port.variables.values()]
-        return {port.signal}.union(*(names_in(text, "variable") for text in texts))
+        names = {port.signal}.union(*(names_in(text, "variable") for text in texts))
+        return not names & {*self._waiting, *waiting}
 
     def _needs_itself(self, name: str) -> bool:
         """Whether a port's signal or variables use what enters there, also through quantities."""
-        found, seen = self._names_at(self._model.ports[name]), set[str]()
-        while found:
-            seen |= found
-            texts = [self._model.quantities[n].expression for n in found & {*self._waiting}]
-            found = set[str]().union(*(names_in(text, "quantity") for text in texts)) - seen
-        return name in seen
+        port, quantities = self._spelt_out.ports[name], self._spelt_out.quantities
+        texts = [own.expression for own in port.variables.values()]
+        texts += [quantities[port.signal].expression] if port.signal in quantities else []
+        return any(name in names_in(text, "variable") for text in texts)
 
     def _enter(self, name: str, port: Port) -> sympy.Expr:
         """A port with its effects, added to the scope."""
