@@ -128,7 +128,10 @@ def forward(  # noqa: PLR0917 -- a kernel
         z[i] = x[i]
         z[n + i * m + m - n + i] = 1.0
     none, room = np.empty(0, np.int64), np.empty(n)
-    across(step, 0, u, row, 0, substeps, hold, none, 1, dt, p.ctypes.data, z, us, times, room, room)
+    across(
+        step, 0, u, row, 0, substeps, hold, none, 1, row * dt, dt, p.ctypes.data, z, us, times,
+        room, room,
+    )  # fmt: skip
     for i in range(n):
         x[i] = z[i]
         for j in range(m):

@@ -22,6 +22,7 @@ class Columns:
         altered: how the samples differ from what was measured, in words.
         passed: frequency up to which signals keep their noise, over the rate: neither low-passed
             nor interpolated away.
+        begun: time of the equations at the first sample [s].
         derived: how channels were derived from measured ones; those that were not are missing.
     """
 
@@ -30,6 +31,7 @@ class Columns:
     units: Mapping[str, str] = field(default_factory=dict)
     altered: tuple[str, ...] = ()
     passed: float = 0.5
+    begun: float = 0.0
     derived: Mapping[str, Derivative] = field(default_factory=dict)
 
     def __len__(self) -> int:

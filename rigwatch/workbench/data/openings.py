@@ -57,4 +57,5 @@ def _lead(samples: int, step: int) -> int:
 
 
 def _part(table: Columns, samples: slice) -> Columns:
-    return replace(table, values={name: column[samples] for name, column in table.values.items()})
+    values = {name: column[samples] for name, column in table.values.items()}
+    return replace(table, values=values, begun=table.begun + (samples.start or 0) * table.dt)

@@ -134,7 +134,13 @@ def _tables(study: Study, remarks: list[str]) -> dict[str, list[Columns]]:
     file = study.file
     uses = {"train": file.train, "held_out": file.held_out, "healthy": file.healthy}
     tables = {
-        use: [with_derived(read_columns(study.folder, span), file.derive) for span in spans]
+        use: [
+            replace(
+                with_derived(read_columns(study.folder, span), file.derive),
+                begun=0.0 if use == "healthy" else _after_first(file, span),
+            )
+            for span in spans
+        ]
         for use, spans in uses.items()
     }
     if any_same(tables["held_out"], tables["train"]):
@@ -145,6 +151,16 @@ def _tables(study: Study, remarks: list[str]) -> dict[str, list[Columns]]:
     else:
         remarks += _judged_and_fitted(file, tables["held_out"])
     return tables
+
+
+def _after_first(file: StudyFile, span: Span) -> float:
+    """Time of the equations at the start of a part of a session [s].
+
+    It goes on from the part in training to a held-out one. What lies before both does not count: an
+    effect has begun with what is explained, not with the session.
+    """
+    explained = (*file.train, *file.held_out)
+    return span.start - min(one.start for one in explained if one.session == span.session)
 
 
 def _judged_and_fitted(file: StudyFile, held_out: Sequence[Columns]) -> Iterator[str]:
@@ -250,8 +266,9 @@ def _recording(
         for name, output in study.model.outputs.items()
     )
     made = Recording(
-        dt, u, y, thinning, parts, passed=passed, breaks=breaks, spacings=spacings, derived=derived
-    )
+        dt, u, y, thinning, parts, passed=passed, breaks=breaks, spacings=spacings,
+        begun=tuple(table.begun for table in tables), derived=derived,
+    )  # fmt: skip
     return with_next_rows(study.model, made, ends)
 
 

@@ -49,10 +49,12 @@ def _near_jumps(fitted: Fit, recording: Recording) -> BoolArray:
     ]
     if not able:
         return near
-    states, spacing = initial_states(system, recording), recording.spacing
+    states = initial_states(system, recording)
     for placement in able:
         effect = placement.effect
-        signals = port_signals(system, placement, recording.inputs, states, spacing, values)
+        signals = port_signals(
+            system, placement, recording.inputs, states, recording.time, recording.spacing, values
+        )
         own = {name: values[placement.prefix + name] for name in effect.parameters}
         pushed = evaluated(effect.expression, signals, own, str(placement))
         sudden = np.abs(np.diff(pushed)) > JUMP * np.max(np.abs(pushed))

@@ -420,7 +420,7 @@ def eigenvalues(fitted: Fitted, recording: Recording) -> ComplexArray:
     run = fitted.compiled.linearise(
         recording.inputs, recording.spacing, starts, 2,
         initial=fitted.train.initial[: len(starts)], parameters=fitted.train.parameters,
-        substeps=fitted.substeps, begins=recording.begins,
+        substeps=fitted.substeps, begins=recording.begins, time=recording.time,
     )  # fmt: skip
     free, n = len(fitted.compiled.system.free), run.states.shape[2]
     slopes = run.rate_slopes[:, 0, :, free : free + n]

@@ -21,7 +21,7 @@ def free_run(fitted: Fitted, recording: Recording) -> FloatArray:
     run = compiled.simulate(
         recording.inputs, recording.spacing, np.zeros(1, np.int64), len(recording),
         initial=first[None], parameters=fitted.train.parameters, substeps=fitted.substeps,
-        begins=recording.begins,
+        begins=recording.begins, time=recording.time,
     )  # fmt: skip
     error = recording.outputs - run.outputs[0]
     return np.asarray(np.sqrt(np.nanmean(error**2, axis=0)))

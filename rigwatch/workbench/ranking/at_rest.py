@@ -54,6 +54,7 @@ def begun_at_rest(
         return compiled.simulate(
             recording.inputs, recording.spacing, starts[resting], OPENING,
             initial=states, parameters=parameters, substeps=substeps, begins=recording.begins,
+            time=recording.time,
         )  # fmt: skip
 
     for _ in range(STEPS):

@@ -70,12 +70,12 @@ def _along(data: Data, base: Fitted, found: Sequence[Candidate]) -> tuple[FloatA
     at = trajectory(
         base.compiled, recording.inputs, recording.spacing, cut.starts, cut.length,
         initial=resting, parameters=fitted.parameters, substeps=substeps,
-        begins=recording.begins,
+        begins=recording.begins, time=recording.time,
     )  # fmt: skip
     run = base.compiled.simulate(
         recording.inputs, recording.spacing, cut.starts, cut.length,
         initial=fitted.initial, parameters=fitted.parameters, substeps=substeps,
-        begins=recording.begins,
+        begins=recording.begins, time=recording.time,
     )  # fmt: skip
     scale = fitted.scale[:, None]
     return directions(at, found) / scale, run.slopes / scale

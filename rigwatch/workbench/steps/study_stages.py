@@ -78,8 +78,9 @@ def signals(stage: Stage, *, held_out: bool = True) -> Signals:
     data, base = stage.bench.data, stage.bench.base
     whole = data.held_out if held_out else data.train
     recording = Recording(
-        whole.dt, whole.inputs, whole.outputs, parts=whole.parts, spacings=whole.spacings
-    )
+        whole.dt, whole.inputs, whole.outputs, parts=whole.parts, spacings=whole.spacings,
+        begun=whole.begun,
+    )  # fmt: skip
     horizon = data.horizon if stage.bench.study.model.states else len(recording)
     residual = evaluate(base.train, recording, horizon, base.substeps).residuals
     flat = residual.reshape(-1, residual.shape[-1])

@@ -1,15 +1,18 @@
 """What an effect remembers of one recording is forgotten at the beginning of the next."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from rigwatch.workbench.compare.preparation import Bench, open_bench
 from rigwatch.workbench.explain import explain
 from rigwatch.workbench.ranking.candidates import candidates
 from rigwatch.workbench.ranking.scoring import rank_only
-from rigwatch.workbench.study.study_file import Accepted
+from rigwatch.workbench.study.study import Study
+from rigwatch.workbench.study.study_file import Accepted, Span
 from tests.workbench.machine import studied
 
 DAMPER = """
@@ -112,3 +115,64 @@ def test_a_load_cell_that_is_late_is_named_beside_a_model_without_states(tmp_pat
     assert "lag@cell" in {f"{best.effect}@{best.port}", *best.class_}
     lag = next(row for row in found.ranking if row.effect == "lag")
     assert lag.parameters["tau"].value == pytest.approx(0.02, rel=0.05)
+
+
+LOAD_CELL = DAMPER + '[ports.cell]\nkind = "sensor"\nsignal = "force"\n'
+MASS = """
+name = "mass"
+summary = "A mass on a damper."
+inputs.push = { unit = "N", hold = "zero" }
+parameters.m = { value = 2.0, unit = "kg", low = 0.1, high = 10.0 }
+parameters.c = { value = 5.0, unit = "N*s/m", low = 0.1, high = 50.0 }
+states.v = { unit = "m/s", derivative = "(push - c*v)/m", measured = "speed" }
+outputs.speed = { unit = "m/s", expression = "v" }
+ports.cell = { kind = "sensor", signal = "speed" }
+"""
+DRIFT = 0.05
+"""What the sensor gains [units of its signal/s], over a signal of about 1."""
+
+
+def drifting(seed: int, seconds: float, *, inertia: bool) -> dict[str, np.ndarray]:
+    """A damper, or a mass on one, whose sensor drifts from zero since the log's beginning."""
+    t = np.arange(round(seconds * 100)) / 100
+    random = np.random.default_rng(seed)
+    push = np.cumsum(random.normal(size=len(t)))
+    push -= np.convolve(push, np.ones(101) / 101, "same")
+    shown = DRIFT * t + 1e-3 * random.normal(size=len(t))
+    if not inertia:
+        return {"x": 0 * t, "v": push, "force": 3 * push + shown}
+    share = 1 - np.exp(-5.0 / 2.0 / 100)
+    v = np.zeros(len(t))
+    for k in range(1, len(t)):
+        v[k] = v[k - 1] + share * (push[k - 1] / 5.0 - v[k - 1])
+    return {"push": push, "speed": v + shown}
+
+
+def drifted(folder: Path, *, inertia: bool) -> Study:
+    """Its study, of several logs, with the drift accepted."""
+    logs = [drifting(seed, 8.0 + seed, inertia=inertia) for seed in range(4)]
+    model, units = (MASS, {"push": "N", "speed": "m/s"}) if inertia else (LOAD_CELL, UNITS)
+    keys = "horizon = 1.0" if inertia else ""
+    study = studied(folder, model, logs[:3], logs[3:], units, keys)
+    return study.with_effects([Accepted(effect="drift", port="cell")])
+
+
+@pytest.mark.parametrize("inertia", [False, True], ids=["without states", "with states"])
+def test_a_sensor_drifts_from_the_beginning_of_each_recording(
+    tmp_path: Path, *, inertia: bool
+) -> None:
+    bench = open_bench(drifted(tmp_path, inertia=inertia))
+    assert bench.base.train.values()["cell_drift_r"] == pytest.approx(DRIFT, rel=0.02)
+    assert bench.base.held_out_error < 1.5e-3
+
+
+@pytest.mark.parametrize("inertia", [False, True], ids=["without states", "with states"])
+def test_it_goes_on_drifting_in_a_held_out_part_of_the_same_recording(
+    tmp_path: Path, *, inertia: bool
+) -> None:
+    study = drifted(tmp_path, inertia=inertia)
+    name = study.file.held_out[0].session
+    halves = (Span(session=name, end=6.0),), (Span(session=name, start=6.0),)
+    parts = structs.replace(study.file, train=halves[0], held_out=halves[1])
+    bench = open_bench(replace(study, file=parts))
+    assert bench.base.held_out_error < 1.5e-3

@@ -92,6 +92,7 @@ class CompiledSystem:
         finest: int = FINEST,
         rows: int = 1,
         begins: IntArray | None = None,
+        time: FloatArray | None = None,
     ) -> Simulation:
         """Simulate windows of the inputs, each from its own initial state.
 
@@ -107,6 +108,7 @@ class CompiledSystem:
             rows: number of input rows per change of a held input, for inputs at finer nodes.
             begins: first sample of the recording that each belongs to, before which held inputs
                 have not changed, shape (samples,); the first of all if None.
+            time: of the equations at each sample, shape (samples,); from `begins` if None [s].
 
         Raises:
             ModelError: a window extends beyond the inputs, or a shape is wrong.
@@ -115,7 +117,9 @@ class CompiledSystem:
         slopes = np.empty((*outputs.shape, self.columns))
         needed = min(finest, steps_for(self.fastest(parameters), float(np.max(dt))))
         steps = max(substeps, needed)
-        arguments = self._arguments(inputs, dt, begins, starts, length, initial, parameters, steps)
+        arguments = self._arguments(
+            inputs, dt, begins, time, starts, length, initial, parameters, steps
+        )
         n = len(self.system.states)
         last = np.empty((len(starts), n * (1 + self.columns)))
         self.kernel.simulate(*arguments, outputs, slopes, last, rows, finest)
@@ -171,10 +175,11 @@ class CompiledSystem:
         parameters: FloatArray,
         substeps: int = 4,
         begins: IntArray | None = None,
+        time: FloatArray | None = None,
     ) -> Linearisation:
         """The trajectory of `simulate` with its Jacobians; same arguments and errors."""
         arguments = self._arguments(
-            inputs, dt, begins, starts, length, initial, parameters, substeps
+            inputs, dt, begins, time, starts, length, initial, parameters, substeps
         )
         n, wide = len(self.system.states), self.columns + len(self.system.probes)
         nodes = (len(starts), (length - 1) * substeps + 1)
@@ -193,6 +198,7 @@ class CompiledSystem:
         inputs: FloatArray,
         dt: float | FloatArray,
         begins: IntArray | None,
+        time: FloatArray | None,
         starts: IntArray,
         length: int,
         initial: FloatArray,
@@ -224,7 +230,9 @@ class CompiledSystem:
         spacing = np.ascontiguousarray(np.broadcast_to(dt, len(inputs)), np.float64)
         if begins is None:
             begins = np.zeros(len(inputs), np.int64)
-        return (driven, spacing, begins, substeps, hold, starts, first, values)
+        if time is None:
+            time = (np.arange(len(inputs)) - begins) * spacing
+        return (driven, spacing, begins, time, substeps, hold, starts, first, values)
 
     def vector(self, values: Mapping[str, float]) -> FloatArray:
         """All parameters, with those in `values` replaced; shape (n_p,).

@@ -105,11 +105,12 @@ def place(  # noqa: PLR0917 -- a kernel
 @part(error_model="numpy")
 def advance(  # noqa: PLR0917 -- a kernel
     step: int, u: FloatArray, row: int, oldest: int, start: float, end: float, hold: FloatArray,
-    rows: int, dt: float, pp: int, z: FloatArray, us: FloatArray, times: FloatArray,
+    rows: int, now: float, dt: float, pp: int, z: FloatArray, us: FloatArray, times: FloatArray,
 ) -> None:  # fmt: skip
     """One Runge-Kutta step between two fractions of a sample; updates z in place.
 
-    `us` holds the inputs at the start, in the middle and at the end, `times` what `step` expects.
+    `now` is the time of the first sample. `us` holds the inputs at the start, in the middle and at
+    the end, `times` what `step` expects.
     """
     middle = 0.5 * (start + end)
     # Inputs at both ends are chosen as inside the step: a jump at an end is not part of it.
@@ -118,9 +119,9 @@ def advance(  # noqa: PLR0917 -- a kernel
     place(u, row, oldest, end, middle, hold, rows, dt, us[2])
     for i in range(3):
         us[i, u.shape[1] + 1] = DAMPED / (dt * (end - start))
-    times[0] = (row + start) * dt
-    times[1] = (row + middle) * dt
-    times[2] = (row + end) * dt
+    times[0] = now + start * dt
+    times[1] = now + middle * dt
+    times[2] = now + end * dt
     times[3] = dt * (end - start)
     tp = times.ctypes.data
     call(step, 0.0, z.ctypes.data, us.ctypes.data, pp, tp, tp)
@@ -140,7 +141,7 @@ def next_change(hold: FloatArray, start: float) -> float:
 @part(error_model="numpy")
 def across(  # noqa: PLR0917 -- a kernel
     step: int, plain: int, u: FloatArray, row: int, oldest: int, steps: int, hold: FloatArray,
-    columns: IntArray, rows: int, dt: float, pp: int, z: FloatArray, us: FloatArray,
+    columns: IntArray, rows: int, now: float, dt: float, pp: int, z: FloatArray, us: FloatArray,
     times: FloatArray, before: FloatArray, after: FloatArray,
 ) -> None:  # fmt: skip
     """Integrate from one sample to the next, in steps that end where an input changes.
@@ -150,17 +151,19 @@ def across(  # noqa: PLR0917 -- a kernel
     """
     # A step across the jump of a held input would reduce the method to first order.
     start = 0.0
-    change(plain, u, row, oldest, 0.0, 0.0, hold, columns, rows, dt, pp, z, us, before, after)
+    change(
+        plain, u, row, oldest, 0.0, 0.0, hold, columns, rows, now, dt, pp, z, us, before, after,
+    )  # fmt: skip
     while start < 1.0:
         end = next_change(hold, start)
         count = math.ceil(steps * (end - start))
         for k in range(count):
             first = start + (end - start) * k / count
             last = start + (end - start) * (k + 1) / count
-            advance(step, u, row, oldest, first, last, hold, rows, dt, pp, z, us, times)
+            advance(step, u, row, oldest, first, last, hold, rows, now, dt, pp, z, us, times)
         change(
-            plain, u, row, oldest, end, 0.5 * (start + end), hold, columns, rows, dt, pp, z, us,
-            before, after,
+            plain, u, row, oldest, end, 0.5 * (start + end), hold, columns, rows, now, dt, pp, z,
+            us, before, after,
         )  # fmt: skip
         start = end
 
@@ -168,12 +171,12 @@ def across(  # noqa: PLR0917 -- a kernel
 @part(error_model="numpy")
 def change(  # noqa: PLR0917 -- a kernel
     plain: int, u: FloatArray, row: int, oldest: int, at: float, inside: float, hold: FloatArray,
-    columns: IntArray, rows: int, dt: float, pp: int, z: FloatArray, us: FloatArray,
+    columns: IntArray, rows: int, now: float, dt: float, pp: int, z: FloatArray, us: FloatArray,
     before: FloatArray, after: FloatArray,
 ) -> None:  # fmt: skip
     """Sensitivities to how late inputs are, where these change at a fraction of a sample."""
     n, inputs, placed = before.size, u.shape[1], False
-    time, zp, m = (row + at) * dt, z.ctypes.data, z.size // before.size - 1
+    time, zp, m = now + at * dt, z.ctypes.data, z.size // before.size - 1
     for j in range(columns.size):
         behind = whole_samples(hold[j])
         new = row - int(behind)
@@ -198,12 +201,12 @@ def change(  # noqa: PLR0917 -- a kernel
 
 @part(error_model="numpy")
 def renew(  # noqa: PLR0917 -- a kernel
-    update: int, u: FloatArray, row: int, oldest: int, hold: FloatArray, rows: int, dt: float,
-    pp: int, z: FloatArray, dz: FloatArray, us: FloatArray,
+    update: int, u: FloatArray, row: int, oldest: int, hold: FloatArray, rows: int, now: float,
+    dt: float, pp: int, z: FloatArray, dz: FloatArray, us: FloatArray,
 ) -> None:  # fmt: skip
     """Update the states that change at samples."""
     place(u, row, oldest, 0.0, 0.0, hold, rows, dt, us)
-    call(update, row * dt, z.ctypes.data, us.ctypes.data, pp, dz.ctypes.data, dz.ctypes.data)
+    call(update, now, z.ctypes.data, us.ctypes.data, pp, dz.ctypes.data, dz.ctypes.data)
     for i in range(z.size):
         z[i] = dz[i]
 
@@ -239,7 +242,7 @@ def restart(z: FloatArray, x0: FloatArray, w: int, m: int) -> None:
 @part(error_model="numpy")
 def needed(  # noqa: PLR0917 -- a kernel
     plain: int, pace: int, crossing: IntArray, u: FloatArray, row: int, oldest: int,
-    hold: FloatArray, rows: int, dt: float, pp: int, z: FloatArray, dx: FloatArray,
+    hold: FloatArray, rows: int, now: float, dt: float, pp: int, z: FloatArray, dx: FloatArray,
     end: FloatArray, near: FloatArray, rates: FloatArray, us: FloatArray,
 ) -> float:  # fmt: skip
     """Number of steps that `pace` requires in the next interval.
@@ -256,7 +259,7 @@ def needed(  # noqa: PLR0917 -- a kernel
     place(u, row, oldest, 0.0, 0.0, hold, rows, dt, us)
     # The Euler step carries a memory no further than to where it slips.
     us[u.shape[1] + 1] = 1.0 / dt
-    call(plain, row * dt, z.ctypes.data, up, pp, dx.ctypes.data, dx.ctypes.data)
+    call(plain, now, z.ctypes.data, up, pp, dx.ctypes.data, dx.ctypes.data)
     for i in range(n):
         near[i] = z[i]
         end[i] = z[i] + dt * dx[i]
@@ -267,7 +270,7 @@ def needed(  # noqa: PLR0917 -- a kernel
     for at, share in ((z, 0.0), (near, 0.0), (end, 1.0)):
         if share > 0.0:
             place(u, row, oldest, share, share, hold, rows, dt, us)
-        call(pace, (row + share) * dt, at.ctypes.data, up, pp, ap, ap)
+        call(pace, now + share * dt, at.ctypes.data, up, pp, ap, ap)
         for i in range(asked.size):
             least[i], most[i] = min(least[i], abs(asked[i])), max(most[i], abs(asked[i]))
     worst = 0.0
@@ -281,16 +284,16 @@ def needed(  # noqa: PLR0917 -- a kernel
 def simulate(  # noqa: PLR0917 -- a kernel
     step: int, read: int, plain: int, pace: int, update: int, updated: bool, asked: int,
     crossing: IntArray, delays: IntArray, columns: IntArray, m: int, rows: int, u: FloatArray,
-    spacing: FloatArray, begins: IntArray, substeps: int, finest: int, hold: FloatArray,
-    starts: IntArray, x0: FloatArray, p: FloatArray, y: FloatArray, dy: FloatArray,
-    last: FloatArray,
+    spacing: FloatArray, begins: IntArray, time: FloatArray, substeps: int, finest: int,
+    hold: FloatArray, starts: IntArray, x0: FloatArray, p: FloatArray, y: FloatArray,
+    dy: FloatArray, last: FloatArray,
 ) -> None:  # fmt: skip
     """Fill outputs y (windows, samples, outputs), slopes dy (…, m) and the last z of each window.
 
-    `spacing` is the time from each row of `u` to the next, `begins` the first row of its recording.
-    Held inputs change every `rows` rows; the first are late by the parameters `delays`, see
-    `across` for their `columns`. Each interval uses `substeps` steps, or as many up to `finest` as
-    the `asked` rates of `pace` require.
+    `spacing` is the time from each row of `u` to the next, `begins` the first row of its recording,
+    `time` that of the equations at each row. Held inputs change every `rows` rows; the first are
+    late by the parameters `delays`, see `across` for their `columns`. Each interval uses `substeps`
+    steps, or as many up to `finest` as the `asked` rates of `pace` require.
     """
     n, size = x0.shape[1], x0.shape[1] * (1 + m)
     dx, end, near, rates = np.empty(n), np.empty(n), np.empty(n), np.empty((3, asked))
@@ -302,12 +305,11 @@ def simulate(  # noqa: PLR0917 -- a kernel
         restart(z, x0, w, m)
         for k in range(y.shape[1]):
             row = starts[w] + k
-            dt, oldest = spacing[row], begins[row]
+            now, dt, oldest = time[row], spacing[row], begins[row]
             delay(hold, delays, p, dt, held)
             place(u, row, oldest, 0.0, 0.0, held, rows, dt, us)
             call(
-                read, row * dt, z.ctypes.data, us.ctypes.data, pp, out.ctypes.data,
-                slopes.ctypes.data,
+                read, now, z.ctypes.data, us.ctypes.data, pp, out.ctypes.data, slopes.ctypes.data,
             )  # fmt: skip
             for o in range(wanted):
                 y[w, k, o] = out[o]
@@ -317,17 +319,17 @@ def simulate(  # noqa: PLR0917 -- a kernel
                 steps = substeps
                 if asked > 0 and finest > substeps:
                     wanted_steps = needed(
-                        plain, pace, crossing, u, row, oldest, held, rows, dt, pp, z, dx, end,
-                        near, rates, us,
+                        plain, pace, crossing, u, row, oldest, held, rows, now, dt, pp, z, dx,
+                        end, near, rates, us,
                     )  # fmt: skip
                     steps = int(min(float(finest), max(float(substeps), math.ceil(wanted_steps))))
                 across(
-                    step, plain, u, row, oldest, steps, held, columns, rows, dt, pp, z, between,
-                    times, dx, end,
+                    step, plain, u, row, oldest, steps, held, columns, rows, now, dt, pp, z,
+                    between, times, dx, end,
                 )  # fmt: skip
                 # Sampled states change together with the held signals.
                 if updated and (row + 1) % rows == 0:
-                    renew(update, u, row + 1, oldest, held, rows, dt, pp, z, dz, us)
+                    renew(update, u, row + 1, oldest, held, rows, now + dt, dt, pp, z, dz, us)
                 forget(z)
         for i in range(size):
             last[w, i] = z[i]
@@ -336,9 +338,9 @@ def simulate(  # noqa: PLR0917 -- a kernel
 @kernel(allocates=True, error_model="numpy", nogil=True)
 def linearise(  # noqa: C901, PLR0912, PLR0917 -- a kernel
     plain_step: int, read_slopes: int, rate_slopes: int, update_slopes: int, delays: IntArray,
-    u: FloatArray, spacing: FloatArray, begins: IntArray, substeps: int, hold: FloatArray,
-    starts: IntArray, x0: FloatArray, p: FloatArray, nodes: FloatArray, slopes: FloatArray,
-    y: FloatArray, dy: FloatArray, jumps: FloatArray,
+    u: FloatArray, spacing: FloatArray, begins: IntArray, time: FloatArray, substeps: int,
+    hold: FloatArray, starts: IntArray, x0: FloatArray, p: FloatArray, nodes: FloatArray,
+    slopes: FloatArray, y: FloatArray, dy: FloatArray, jumps: FloatArray,
 ) -> None:  # fmt: skip
     """The trajectory without sensitivities, and the Jacobians at its nodes."""
     n, wide = x0.shape[1], slopes.shape[3]
@@ -351,20 +353,20 @@ def linearise(  # noqa: C901, PLR0912, PLR0917 -- a kernel
             z[i] = x0[w, i]
         for k in range(y.shape[1]):
             row, last = starts[w] + k, k + 1 == y.shape[1]
-            dt, oldest = spacing[row], begins[row]
+            now, dt, oldest = time[row], spacing[row], begins[row]
             us[u.shape[1] + 1] = DAMPED_BY_HEUN * substeps / dt
             delay(hold, delays, p, dt, held)
             for step in range(1 if last else substeps):
                 share = step / substeps
                 place(u, row, oldest, share, share, held, 1, dt, us)
                 if step == 0:
-                    call(read_slopes, row * dt, zp, up, pp, op, fp)
+                    call(read_slopes, now, zp, up, pp, op, fp)
                     for o in range(wanted):
                         y[w, k, o] = out[o]
                         for j in range(wide):
                             dy[w, k, o, j] = flat[o * wide + j]
                 node = k * substeps + step
-                call(rate_slopes, (row + share) * dt, zp, up, pp, op, fp)
+                call(rate_slopes, now + share * dt, zp, up, pp, op, fp)
                 for i in range(n):
                     nodes[w, node, i] = z[i]
                     for j in range(wide):
@@ -373,13 +375,13 @@ def linearise(  # noqa: C901, PLR0912, PLR0917 -- a kernel
                     while share < (step + 1) / substeps:
                         following = min(next_change(held, share), (step + 1) / substeps)
                         advance(
-                            plain_step, u, row, oldest, share, following, held, 1, dt, pp, z,
-                            between, times,
+                            plain_step, u, row, oldest, share, following, held, 1, now, dt, pp,
+                            z, between, times,
                         )  # fmt: skip
                         share = following
             if jumps.shape[1] > 0 and not last:
                 place(u, row + 1, oldest, 0.0, 0.0, held, 1, dt, us)
-                call(update_slopes, (row + 1) * dt, zp, up, pp, op, fp)
+                call(update_slopes, now + dt, zp, up, pp, op, fp)
                 for i in range(n):
                     z[i] = out[i]
                     for j in range(wide):

@@ -146,14 +146,14 @@ class NativeKernel:
         return self._along
 
     def simulate(  # noqa: PLR0917 -- they stand in the order of the driver's
-        self, u: Any, spacing: Any, begins: Any, substeps: Any, hold: Any, starts: Any, x0: Any,
-        p: Any, y: Any, dy: Any, last: Any, rows: int, finest: int,
+        self, u: Any, spacing: Any, begins: Any, time: Any, substeps: Any, hold: Any, starts: Any,
+        x0: Any, p: Any, y: Any, dy: Any, last: Any, rows: int, finest: int,
     ) -> None:  # fmt: skip
         """Fill outputs (windows, samples, outputs), their slopes (…, m) and the last [x | S]."""
         kernel = partial(
             driver.simulate, *self._compiled_along(), bool(self._system.updates),
             len(self._system.pace.asked), self._crossing, self._delays, self._delay_columns,
-            self._columns, rows, u, spacing, begins, substeps, finest, hold,
+            self._columns, rows, u, spacing, begins, time, substeps, finest, hold,
         )  # fmt: skip
         numbers = x0.shape[1] * (1 + self._columns)
         # Starting threads costs more than a small simulation.
@@ -217,8 +217,8 @@ class NativeKernel:
         return self._slopes
 
     def linearise(  # noqa: PLR0917 -- they stand in the order of the driver's
-        self, u: Any, spacing: Any, begins: Any, substeps: Any, hold: Any, starts: Any, x0: Any,
-        p: Any, nodes: Any, slopes: Any, y: Any, dy: Any, jumps: Any,
+        self, u: Any, spacing: Any, begins: Any, time: Any, substeps: Any, hold: Any, starts: Any,
+        x0: Any, p: Any, nodes: Any, slopes: Any, y: Any, dy: Any, jumps: Any,
     ) -> None:  # fmt: skip
         """Fill the states at the nodes, the slopes of rates there, outputs and their slopes.
 
@@ -227,8 +227,8 @@ class NativeKernel:
         equations = self.jacobians()
         with turn_given():
             driver.linearise(
-                *equations, self._delays, u, spacing, begins, substeps, hold, starts, x0, p, nodes,
-                slopes, y, dy, jumps,
+                *equations, self._delays, u, spacing, begins, time, substeps, hold, starts, x0, p,
+                nodes, slopes, y, dy, jumps,
             )  # fmt: skip
 
 

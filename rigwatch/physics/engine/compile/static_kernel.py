@@ -111,30 +111,30 @@ class StaticKernel:
     def _evaluate(
         self,
         u: FloatArray,
-        spacing: FloatArray,
+        time: FloatArray,
         starts: NDArray[np.int64],
         length: int,
         p: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
         rows = starts[:, None] + np.arange(length)
-        signals = [rows * spacing[rows], *np.moveaxis(u[rows], -1, 0)]
+        signals = [time[rows], *np.moveaxis(u[rows], -1, 0)]
         values = self._function(*signals, *p)
         whole = np.stack([np.broadcast_to(value, rows.shape) for value in values], axis=-1)
         slopes = whole[..., self._outputs :].reshape(*rows.shape, self._outputs, self._all)
         return whole[..., : self._outputs], slopes
 
     def simulate(  # noqa: PLR0917 -- the arguments of a compiled kernel
-        self, u: Any, spacing: Any, _b: Any, _s: Any, _h: Any, starts: Any, _x: Any, p: Any, y: Any,
-        dy: Any, _l: Any, _r: Any, _f: Any,
+        self, u: Any, _d: Any, _b: Any, time: Any, _s: Any, _h: Any, starts: Any, _x: Any, p: Any,
+        y: Any, dy: Any, _l: Any, _r: Any, _f: Any,
     ) -> None:  # fmt: skip
         """Fill outputs (windows, samples, outputs) and their slopes by the free parameters."""
-        y[:], slopes = self._evaluate(u, spacing, starts, y.shape[1], p)
+        y[:], slopes = self._evaluate(u, time, starts, y.shape[1], p)
         dy[:] = slopes[..., : self._free]
 
     def linearise(  # noqa: PLR0917 -- the arguments of a compiled kernel
-        self, u: Any, spacing: Any, _b: Any, substeps: Any, _h: Any, starts: Any, _x: Any, p: Any,
-        _nodes: Any, _slopes: Any, y: Any, dy: Any, _jumps: Any,
+        self, u: Any, _d: Any, _b: Any, time: Any, substeps: Any, _h: Any, starts: Any, _x: Any,
+        p: Any, _nodes: Any, _slopes: Any, y: Any, dy: Any, _jumps: Any,
     ) -> None:  # fmt: skip
         """The same with the slopes by the probes behind those by the parameters."""
         del substeps
-        y[:], dy[:] = self._evaluate(u, spacing, starts, y.shape[1], p)
+        y[:], dy[:] = self._evaluate(u, time, starts, y.shape[1], p)

@@ -65,9 +65,11 @@ class EffectStates:
         self._system = self._compiled.system
         self._first = np.array([[state.start for state in effect.states.values()]])
         self._spacing, self._rows = spacing, rows
+        self._time = signals.get(TIME) if TIME in used else None
         # Systems with the same equations and names share a kernel.
         made_by = (self._compiled.kernel, rows, hold, late, self._first.tobytes())
-        self._key = (*made_by, self._driving.shape, digest(self._driving), digest(spacing))
+        given = (self._driving, spacing, *([] if self._time is None else [self._time]))
+        self._key = (*made_by, self._driving.shape, *map(digest, given))
 
     def run(self, values: Mapping[str, float], arriving: Signals | None = None) -> Signals:
         """Each state by name, shape (nodes,).
@@ -89,6 +91,7 @@ class EffectStates:
         run = self._compiled.simulate(
             driving, self._spacing, np.zeros(1, np.int64), len(driving),
             initial=self._first, parameters=parameters, substeps=1, rows=self._rows,
+            time=self._time,
         )  # fmt: skip
         return np.asarray(run.outputs[0], np.float64)
 

@@ -73,9 +73,11 @@ def motion_recording(
     lengths = tuple(np.diff([0, *cut, len(recording)]).tolist())
     thinning = _thinning(model, recording, chosen, lengths)
     drives = len(model.inputs)
+    begun = tuple(recording.time[[0, *cut]].tolist())
     return Recording(
         recording.dt, inputs, shown, thinning, lengths, drives, recording.passed,
-        spacings=recording.spacings and spacings, derived=_derived(model, recording),
+        spacings=recording.spacings and spacings, begun=begun,
+        derived=_derived(model, recording),
     )  # fmt: skip
 
 

@@ -22,6 +22,7 @@ def port_signals(  # noqa: PLR0917 -- they belong together
     placement: Placement,
     inputs: FloatArray,
     states: FloatArray,
+    time: FloatArray,
     spacing: FloatArray,
     values: Mapping[str, float],
 ) -> Signals:
@@ -32,11 +33,12 @@ def port_signals(  # noqa: PLR0917 -- they belong together
         placement: the effect.
         inputs: shape (n, inputs).
         states: from the channels, shape (n, states).
+        time: of each sample, shape (n,) [s].
         spacing: time from each sample to the next, shape (n,) [s].
         values: parameters by name.
     """
     port = system.model.ports[placement.entry]
-    known: Signals = {TIME: spacing * np.arange(len(inputs), dtype=np.float64)}
+    known: Signals = {TIME: time}
     known |= dict(zip(system.states, states.T, strict=True))
     known |= dict(zip(system.model.inputs, inputs.T, strict=True))
 

@@ -96,12 +96,13 @@ class Problem:
         rows = self._cut.starts[:, None] + np.arange(self._cut.length)
         self.measured = recording.outputs[np.minimum(rows, len(recording) - 1)]
         self._inputs, self._spacing = recording.inputs, recording.spacing
-        self._begins = recording.begins
+        self._begins, self._time = recording.begins, recording.time
         if self._cut.parts:
             ends = np.array(self._cut.parts)[:, None]
             self.measured[np.arange(self._cut.length) >= ends] = np.nan
             beyond = int(rows.max()) + 1 - len(recording)
-            self._inputs, self._spacing, self._begins = self._with_last_repeated(beyond)
+            longer = self._with_last_repeated(beyond)
+            self._inputs, self._spacing, self._begins, self._time = longer
         self.scale = np.nanstd(recording.outputs, axis=0) if scale is None else scale
         self.scale = np.where(self.scale > 0, self.scale, 1.0)
         begun = initial_states(system, recording)
@@ -111,6 +112,7 @@ class Problem:
             system,
             recording.inputs,
             begun,
+            recording.time,
             recording.spacing,
             compiled.parameters,
             recording.slices,
@@ -227,7 +229,7 @@ class Problem:
         run = self.compiled.simulate(
             self._inputs, self._spacing, self._cut.starts,
             max(self._cut.length // FOLLOWED, 2), initial=self.initial, parameters=parameters,
-            substeps=self._substeps, begins=self._begins,
+            substeps=self._substeps, begins=self._begins, time=self._time,
         )  # fmt: skip
         found = self.initial.copy()
         found[:, self.hidden] = np.clip(run.last, self._low, self._high)[:, self.hidden]
@@ -265,24 +267,28 @@ class Problem:
             Scaled residuals and slopes; states (rows, states), slopes (rows, states, free +
             states).
         """
-        inputs, spacing, begins = self._and_next
+        inputs, spacing, begins, time = self._and_next
         run = self.compiled.simulate(
             inputs, spacing, self._cut.starts[rows], self._cut.length + 1, initial=initial,
-            parameters=parameters, substeps=self._substeps, begins=begins,
+            parameters=parameters, substeps=self._substeps, begins=begins, time=time,
         )  # fmt: skip
         error, slopes = self._scaled(run.outputs[:, :-1], run.slopes[:, :-1], rows)
         return error, slopes, run.last, run.last_slopes
 
     @cached_property
-    def _and_next(self) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Inputs, spacing and begins, the last sample repeated: the last window has a next one."""
+    def _and_next(self) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
+        """`_with_last_repeated`, once: the last window has a next sample."""
         return self._with_last_repeated(1)
 
-    def _with_last_repeated(self, samples: int) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Inputs, spacing and begins, their last sample repeated."""
+    def _with_last_repeated(
+        self, samples: int
+    ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray]:
+        """Inputs, spacing, begins and time; the last sample is repeated, while time goes on."""
         inputs = np.pad(self._inputs, ((0, samples), (0, 0)), mode="edge")
         spacing = np.pad(self._spacing, (0, samples), mode="edge")
-        return inputs, spacing, np.pad(self._begins, (0, samples), mode="edge")
+        begins = np.pad(self._begins, (0, samples), mode="edge")
+        beyond = self._time[-1] + self._spacing[-1] * np.arange(1, samples + 1)
+        return inputs, spacing, begins, np.concatenate([self._time, beyond])
 
     def _scaled(
         self, outputs: FloatArray, slopes: FloatArray, rows: IntArray
@@ -305,6 +311,7 @@ class Problem:
         run = self.compiled.simulate(
             self._inputs, self._spacing, self._cut.starts[rows], self._cut.length,
             initial=initial, parameters=parameters, substeps=self._substeps, begins=self._begins,
+            time=self._time,
         )  # fmt: skip
         while len(self._runs) >= REMEMBERED:
             del self._runs[next(iter(self._runs))]
@@ -372,7 +379,7 @@ class Problem:
         run = self.compiled.simulate(
             self._inputs, self._spacing, self._cut.starts[before], self._cut.length + 1,
             initial=self.initial[before], parameters=parameters, substeps=self._substeps,
-            begins=self._begins,
+            begins=self._begins, time=self._time,
         )  # fmt: skip
         ended = np.clip(run.last, self._low, self._high)
         return np.where(np.isfinite(ended), ended, self.initial[rows])

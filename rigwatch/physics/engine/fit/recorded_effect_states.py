@@ -107,6 +107,7 @@ class RecordedEffectStates:
         system: a model with effects.
         inputs: shape (n, inputs).
         states: from the channels, shape (n, states).
+        time: of each sample, shape (n,) [s].
         spacing: time from each sample to the next, shape (n,) [s].
         parameters: all parameters, shape (n_p,), on which a port's signals may depend.
         parts: samples of each of the joined recordings; all of one if None.
@@ -122,6 +123,7 @@ class RecordedEffectStates:
         system: System,
         inputs: FloatArray,
         states: FloatArray,
+        time: FloatArray,
         spacing: FloatArray,
         parameters: FloatArray,
         parts: Sequence[slice] | None = None,
@@ -131,7 +133,7 @@ class RecordedEffectStates:
         order, self._spacing = list(system.states), spacing
         self._placed = []
         for placement in (each for each in system.placements if each.effect.states):
-            signals = port_signals(system, placement, inputs, states, spacing, values)
+            signals = port_signals(system, placement, inputs, states, time, spacing, values)
             port = system.model.ports[placement.entry]
             apart = parts or [slice(None)]
             own = [

@@ -35,6 +35,7 @@ class Recording:
         breaks: samples before which inputs are unknown for a while, so that hidden states begin
             anew in the next window.
         spacings: time between the samples of each part if they differ [s]; all `dt` if empty.
+        begun: time of the equations at the first sample of each part; 0 if empty [s].
         derived: how each output was derived from a measured channel, None of those that were not;
             none was if empty.
     """
@@ -48,6 +49,7 @@ class Recording:
     passed: float = 0.5
     breaks: tuple[int, ...] = ()
     spacings: tuple[float, ...] = ()
+    begun: tuple[float, ...] = ()
     derived: tuple[Derivative | None, ...] = ()
 
     def __len__(self) -> int:
@@ -87,12 +89,24 @@ class Recording:
         first = np.array([part.start for part in self.slices], np.int64)
         return np.repeat(first, self.parts or (len(self),))
 
+    @property
+    def times_begun(self) -> tuple[float, ...]:
+        """Time of the equations at the first sample of each of the joined recordings [s]."""
+        return self.begun or (0.0,) * max(len(self.parts), 1)
+
+    @property
+    def time(self) -> FloatArray:
+        """Time of the equations at each sample, shape (n,) [s]."""
+        since = (np.arange(len(self)) - self.begins) * self.spacing
+        return np.repeat(self.times_begun, self.parts or (len(self),)) + since
+
     def stretch(self, begin: int, end: int) -> "Recording":
         """The samples from `begin` to before `end`; their residuals are not thinned."""
         own = [(max(one.start, begin), min(one.stop, end)) for one in self.slices]
         kept = [(last - first, k) for k, (first, last) in enumerate(own) if last > first]
         lengths, numbers = zip(*kept, strict=True)
         dt, spacings = of_parts([self.own_spacings[k] for k in numbers], lengths)
+        after = {k: max(begin - self.slices[k].start, 0) * self.own_spacings[k] for k in numbers}
         return replace(
             self,
             dt=dt,
@@ -102,6 +116,7 @@ class Recording:
             parts=lengths,
             breaks=tuple(at - begin for at in self.breaks if begin <= at < end),
             spacings=spacings,
+            begun=tuple(self.times_begun[k] + after[k] for k in numbers),
         )
 
 
@@ -168,6 +183,7 @@ def joined(recordings: Sequence[Recording]) -> Recording:
         passed=min(each.passed for each in recordings),
         breaks=breaks,
         spacings=spacings,
+        begun=tuple(at for each in recordings for at in each.times_begun),
     )
 
 
@@ -202,7 +218,7 @@ def beginning(recording: Recording, samples: int) -> Recording:
     breaks = tuple(at for at in recording.breaks if at < len(inputs))
     return replace(
         recording, dt=recording.own_spacings[0], inputs=inputs, outputs=outputs, thinning=thinning,
-        parts=(), breaks=breaks, spacings=(),
+        parts=(), breaks=breaks, spacings=(), begun=recording.begun[:1],
     )  # fmt: skip
 
 

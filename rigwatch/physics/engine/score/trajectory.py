@@ -57,11 +57,12 @@ def trajectory(
     parameters: FloatArray,
     substeps: int = 4,
     begins: IntArray | None = None,
+    time: FloatArray | None = None,
 ) -> Trajectory:
     """The run of `CompiledSystem.linearise`, same arguments, with inputs and time at its nodes."""
     run = compiled.linearise(
         inputs, dt, starts, length, initial=initial, parameters=parameters, substeps=substeps,
-        begins=begins,
+        begins=begins, time=time,
     )  # fmt: skip
     nodes = np.arange(run.states.shape[1])
     row, place = nodes // substeps, (nodes % substeps) / substeps
@@ -85,9 +86,9 @@ def trajectory(
         else:
             behind = np.ceil(after - place).astype(np.int64)
             at_nodes[..., column] = signal[np.maximum(rows - behind, oldest)]
-    time = (rows + place) * spacing
+    since = (rows - oldest) * spacing if time is None else time[rows]
     apart = () if begins is None else _apart(begins[starts])
-    return Trajectory(compiled, run, at_nodes, time, parameters, apart)
+    return Trajectory(compiled, run, at_nodes, since + place * spacing, parameters, apart)
 
 
 def _apart(begun: IntArray) -> tuple[slice, ...]:

@@ -171,10 +171,10 @@ def _signals(
     """All variables of the equations except the free parameters, along the recording."""
     states = initial_states(system, recording, width)
     inputs, spacing = recording.inputs, recording.spacing
-    led = RecordedEffectStates(system, inputs, states, spacing, begin).at(begin)
+    led = RecordedEffectStates(system, inputs, states, recording.time, spacing, begin).at(begin)
     for column, values in led.items():
         states[:, column] = values
-    known: dict[str, FloatArray] = {TIME: spacing * np.arange(len(inputs), dtype=np.float64)}
+    known: dict[str, FloatArray] = {TIME: recording.time}
     known |= dict(zip(system.states, states.T, strict=True))
     known |= dict(zip(system.model.inputs, inputs.T, strict=True))
     fixed = dict(zip(system.parameters, begin.tolist(), strict=True))

@@ -87,11 +87,12 @@ def _part(study: Study, data: Data) -> TrainingPart | None:
     chosen = np.concatenate([np.arange(first, first + count) for first, count in stretches])
     rows = (starts[chosen][:, None] + np.arange(length)).ravel()
     parts = tuple(count * length for _, count in stretches)
-    own = whole.spacing[starts[[first for first, _ in stretches]]]
+    begins = starts[[first for first, _ in stretches]]
+    own, begun = whole.spacing[begins], whole.time[begins]
     dt, spacings = of_parts(own.tolist(), parts)
     train = replace(
         whole, dt=dt, inputs=whole.inputs[rows], outputs=whole.outputs[rows], parts=parts,
-        breaks=(), spacings=spacings,
+        breaks=(), spacings=spacings, begun=tuple(begun.tolist()),
     )  # fmt: skip
     return TrainingPart(replace(data, train=train), chosen)
 
