@@ -147,6 +147,7 @@ def test_a_wrong_file_of_a_cluster_is_one_sentence(tmp_path, monkeypatch):
         pass
 
 
+@pytest.mark.nightly
 def test_at_last_a_scheduler_that_goes_away_is_reported_and_results_are_kept(
     cluster, files, tmp_path
 ):

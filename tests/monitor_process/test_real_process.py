@@ -85,7 +85,9 @@ def test_a_killed_or_frozen_monitor_judges_every_sample_and_keeps_its_alarms(rig
     assert monitor.wait(PATIENCE) == 0
 
 
-@pytest.mark.parametrize("state", ["unacknowledged", "normal"])
+@pytest.mark.parametrize(
+    "state", ["unacknowledged", pytest.param("normal", marks=pytest.mark.nightly)]
+)
 def test_a_kill_between_journal_and_delivery_leaves_no_change_untold(
     rig: TestRig, state: str
 ) -> None:

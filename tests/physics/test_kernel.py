@@ -62,6 +62,7 @@ CHANGES = [
 """Each makes 12 of 8."""
 
 
+@pytest.mark.nightly
 def test_what_another_file_holds_is_part_of_the_key(tmp_path: Path) -> None:
     (tmp_path / "caller.py").write_text(CALLER)
     called = tmp_path / "called.py"

@@ -162,6 +162,7 @@ def test_what_was_missed_in_a_cut_comes_from_the_sites_recordings(sites: Sites) 
     assert_same(*sites.end())
 
 
+@pytest.mark.nightly
 def test_source_and_headquarters_start_anew_in_the_cut(sites: Sites) -> None:
     sites.wait("samples", RATE)
     sites.cut()

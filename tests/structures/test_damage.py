@@ -144,6 +144,7 @@ def frame_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     share=st.floats(0.3, 0.9),
     time=st.floats(3.0, 6.0),
 )
+@pytest.mark.nightly
 def test_any_softening_of_a_small_frame_is_found(
     frame_file: Path, spring: str, share: float, time: float
 ) -> None:

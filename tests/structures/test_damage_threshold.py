@@ -113,6 +113,7 @@ def test_the_noise_does_not_seem_less_by_what_was_identified_from_it(tmp_path: P
 KNOWN = FRAME.replace(", unknown = true", "")
 
 
+@pytest.mark.nightly
 def test_a_small_damage_is_dated_with_an_interval_that_holds_its_instant(tmp_path: Path) -> None:
     path = tmp_path / "frame.toml"
     path.write_text(KNOWN, encoding="utf-8")

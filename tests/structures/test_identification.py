@@ -142,6 +142,7 @@ def test_an_unknown_start_is_found():
         assert abs(found.parameters["v6(0)"]) < 0.2, truth
 
 
+@pytest.mark.nightly
 def test_the_interval_of_an_unknown_start_is_of_the_record():
     made, nodes, names = simulate(FILE, 0.01, 10.0), range(1, 9), [*NAMES, "x6(0)", "v6(0)"]
     within, seeds = 0, 10

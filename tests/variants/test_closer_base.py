@@ -54,6 +54,7 @@ def test_a_base_that_leaves_noise_stays(tmp_path: Path) -> None:
     assert closer_base(bench(tmp_path, 0.0), no_progress) is None
 
 
+@pytest.mark.nightly
 def test_two_effects_at_once_are_told_on_its_own_base_and_undetermined_on_another(
     tmp_path: Path,
 ) -> None:

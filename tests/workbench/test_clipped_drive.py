@@ -44,7 +44,8 @@ def swinging(samples: int, lines: tuple[float, ...], seed: int) -> np.ndarray:
     return np.asarray(9 * sum(sines) / np.abs(sum(sines)).max())
 
 
-@pytest.mark.parametrize("seed", [5, pytest.param(6, marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", [5, 6])
 def test_a_sensor_that_clips_does_not_stand_in_for_a_drive_that_does(seed: int) -> None:
     study = knowing(motor_study(R, K), *COMMON)
     train = [stepped(2400, seed), swinging(2400, (0.23, 0.7, 1.7), seed)]

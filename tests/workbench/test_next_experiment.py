@@ -38,6 +38,7 @@ def bench_under(force: FloatArray, seed: int) -> Bench:
     return bench_of(study(), data, 2e-3 * np.nanstd(train.outputs, axis=0))
 
 
+@pytest.mark.nightly
 def test_the_proposed_experiment_tells_a_lopsided_spring_from_the_fault_of_a_signal() -> None:
     bench = bench_under(SINE, seed=3)
     rows, verdict = ranking(bench)

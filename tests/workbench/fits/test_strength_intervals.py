@@ -122,6 +122,7 @@ def found_in(seed: int) -> tuple[Fit, float, Value, Value]:
     return found.train, friction, whole, scatter
 
 
+@pytest.mark.nightly
 def test_intervals_hold_strengths_of_plants_with_other_laws() -> None:
     every = [found_in(seed)[1:] for seed in range(PLANTS)]
     held = [holds(whole, truth) for truth, whole, _ in every]

@@ -65,9 +65,8 @@ def bare(healthy: Callable[[int], Case]) -> Taught:
     return made
 
 
-@pytest.mark.parametrize(
-    "seed", [2, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (3, 6))]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", [2, 3, 6])
 def test_products_are_learned_from_any_excitation(taught: Taught, bare: Taught, seed: int) -> None:
     found = taught(seed)
 

@@ -103,7 +103,12 @@ def test_rarer_effects_are_counted_apart_and_offered_where_none_explains_the_err
     [
         (stop_below, "stop_below"),
         (binding, "local_binding"),
-        pytest.param(behind_gap, "jenkins_behind_gap", id="coarser friction leaves much"),
+        pytest.param(
+            behind_gap,
+            "jenkins_behind_gap",
+            id="coarser friction leaves much",
+            marks=pytest.mark.nightly,
+        ),
     ],
 )
 def test_a_rarer_effect_is_named_in_a_second_pass(

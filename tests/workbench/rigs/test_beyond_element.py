@@ -66,11 +66,12 @@ def study_of(folder: Path, before: float, behind: float) -> Study:
     return with_healthy(made, table(2, 0.0, 0.0), UNITS, RATE)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("before", "behind", "side"),
     [
         (0.0, DEAD, "valve_hysteresis"),
-        pytest.param(DEAD, 0.0, "", marks=pytest.mark.nightly),
+        (DEAD, 0.0, ""),
     ],
 )
 def test_the_side_of_the_play_on_which_a_dead_zone_lies_is_found_and_kept(

@@ -30,6 +30,7 @@ def test_a_healthy_rig_has_nothing_missing(tmp_path):
     assert ranking(bench)[1].word == "nothing_missing"
 
 
+@pytest.mark.nightly
 def test_drag_shows_above_what_the_box_leaves_anyway(tmp_path):
     record(tmp_path, "healthy", 1)
     record(tmp_path, "rig", 2, viscous=0.1)

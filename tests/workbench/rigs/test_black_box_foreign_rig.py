@@ -58,6 +58,7 @@ def bench(case: str) -> Bench:
     return bench_of(study, replace(driven, horizon=data.horizon), scale)
 
 
+@pytest.mark.nightly
 def test_nothing_is_missing_where_nothing_is_hidden() -> None:
     found = bench("none")
 
@@ -79,6 +80,7 @@ def test_what_is_hidden_is_named_under_any_excitation(case: str, named: str) -> 
     assert named in verdict.members
 
 
+@pytest.mark.nightly
 def test_what_another_motion_may_leave_is_not_named() -> None:
     found = bench("pressure")
 

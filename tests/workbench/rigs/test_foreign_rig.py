@@ -77,7 +77,7 @@ def test_healthy_fit_comes_near_to_what_repeated_periods_allow() -> None:
         pytest.param("spring", "linear_stiffness@load", "k", None, marks=pytest.mark.nightly),
         ("deadband", "dead_band@drive", "b", 0.03),
         pytest.param("saturation", "saturation@drive", "us", 0.5, marks=pytest.mark.nightly),
-        ("coulomb_strong", "coulomb@load", "Fc", None),
+        pytest.param("coulomb_strong", "coulomb@load", "Fc", None, marks=pytest.mark.nightly),
     ],
 )
 def test_what_is_hidden_is_named(

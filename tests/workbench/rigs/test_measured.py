@@ -33,6 +33,7 @@ def test_silverbox_has_a_cubic_spring_and_no_quadratic_one(silverbox: Path, tmp_
     assert change.after.channels["output"].held_out_error < 1e-3
 
 
+@pytest.mark.nightly
 def test_emps_in_open_loop_beats_the_published_grey_box(emps: Path, tmp_path: Path) -> None:
     study = create(tmp_path / "s", CONFIGS / "studies" / "emps_position.toml", emps)
     error = compare(study).channels["position"].free_run_error

@@ -107,10 +107,8 @@ def shell(tmp_path: Path) -> Iterator[Shell]:
     made.close()
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "asked", [pytest.param("explain", marks=pytest.mark.nightly), "the alarm has told the effect"]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("asked", ["explain", "the alarm has told the effect"])
 def test_the_story_of_the_rig_as_it_is_typed(shell: Shell, asked: str) -> None:
     commission, up, alarms, *study, promote, rollback = typed()
     assert "--commission-only" in commission

@@ -158,6 +158,7 @@ def slid(seed: int, zero: float) -> dict[str, np.ndarray]:
     return {"v": v, "force": table["force"] + 0.8 * friction}
 
 
+@pytest.mark.nightly
 def test_an_effect_with_memory_is_fitted_where_a_zero_moves(tmp_path: Path) -> None:
     """Its states run through whole recordings, and through the opening of the one held out."""
     found = explain(damper(tmp_path, slid, "acb", "[thin]\nfactor = 7\nedge = 15\n"))

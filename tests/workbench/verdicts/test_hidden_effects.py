@@ -57,9 +57,12 @@ def named(verdict: Verdict) -> set[str]:
         ("coulomb", {"coulomb@load"}),
         ("cubic_stiffness", {"cubic_stiffness@load"}),
         ("valve_hysteresis", {"valve_hysteresis@drive"}),
-        ("acceleration_lag", {"lag@acceleration_sensor", "delay@acceleration_sensor"}),
+        pytest.param(
+            "acceleration_lag", {"lag@acceleration_sensor", "delay@acceleration_sensor"},
+            marks=pytest.mark.nightly,
+        ),
     ],
-)
+)  # fmt: skip
 def test_a_hidden_effect_is_named_and_nothing_but_noise_is_left(
     name: str, labels: set[str]
 ) -> None:

@@ -122,6 +122,7 @@ def named_alone(bench, rows):
     return dataclasses.replace(found, word="missing_effect")
 
 
+@pytest.mark.nightly
 def test_a_second_effect_is_named_where_noise_hides_most_of_what_the_first_leaves(bench, rows):
     alone = named_alone(bench, rows)
     noisy = along_motion(bench, bench.floor.ratio(alone.best.fitted.held_out) / 1.2)

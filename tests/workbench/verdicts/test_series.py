@@ -41,6 +41,7 @@ def verdict(name: str, *, whole_library: bool = True) -> Verdict:
 COMPOSITE = "viscous_behind_play"
 
 
+@pytest.mark.nightly
 def test_a_composite_is_named() -> None:
     found = verdict(COMPOSITE)
     assert found.word == "missing_effect"

@@ -152,6 +152,7 @@ def test_a_second_pass_extends_the_sets_of_the_first_by_rarer_effects(tmp_path: 
     assert usual == {each.effect for each in scored_with(bench, Combination((row,)))}
 
 
+@pytest.mark.nightly
 def test_a_set_that_a_second_pass_makes_once_more_is_fitted_once(tmp_path: Path) -> None:
     bench = open_bench(damper(tmp_path, lambda x, v: 4 * np.tanh(v / 0.002) + 2e6 * x**3))
     rows = {row.label: row for row in rank(bench.study, bench.data, bench.base, bench.floor)}

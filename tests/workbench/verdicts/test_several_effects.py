@@ -91,6 +91,7 @@ def test_an_effect_with_a_shape_of_its_own_is_not_taken_for_two_simple_ones():
     assert verdict.second == ()
 
 
+@pytest.mark.nightly
 def test_friction_that_falls_with_speed_is_not_taken_for_dry_friction_and_drag(tmp_path):
     plant, seed = MACHINES["pendulum"], 114
     hidden = {name: machine_strength(plant, name, 0.1, seed) for name in ("coulomb", "air_drag")}
