@@ -234,3 +234,34 @@ outputs.y = { unit = "1", expression = "x" }
     recording = Recording(0.1, np.ones((80, 1)), np.ones((80, 1)))
     with pytest.raises(ModelError, match="diverged"):
         fit(compiled, recording, 80)
+
+
+DRAINED = """
+name = "drained"
+summary = "a tank that drains, its hole above what is left in the end"
+inputs.u = { unit = "m/s" }
+states.h = { unit = "m", derivative = "u - a*sqrt(max(h, 0)) - leak", measured = "level" }
+parameters.a = { value = 0.5, unit = "m^0.5/s", low = 0.0 }
+parameters.leak = { value = 0.1, unit = "m/s", fixed = true }
+outputs.level = { unit = "m", expression = "h" }
+"""
+
+
+def test_a_flow_that_has_ended_leaves_the_slopes_finite_and_right():
+    compiled = compile_system(compose(parse(DRAINED, Model, "drained")))
+    u = np.where(np.arange(400) < 200, 0.0, 0.4)[:, None]
+
+    def run(a: float):
+        return compiled.simulate(
+            u, 0.02, np.array([0]), 400, initial=np.ones((1, 1)),
+            parameters=compiled.vector({"a": a}),
+        )  # fmt: skip
+
+    at, step = run(0.8), 1e-5
+    assert at.outputs[0, :, 0].min() < -0.05, "it drains below the hole"
+    found = (run(0.8 + step).outputs - run(0.8 - step).outputs)[0, :, 0] / (2 * step)
+    # Where the flow ends, the error of a step does not fall with the difference.
+    assert np.abs(at.slopes[0, :, 0, 0] - found).max() < 0.02 * np.abs(found).max()
+    read = at.outputs[0] + 0.01 * np.random.default_rng(0).normal(size=(400, 1))
+    fitted = fit(compiled, Recording(0.02, u, read), horizon=400)
+    assert fitted.values()["a"] == pytest.approx(0.8, rel=0.02)

@@ -1,6 +1,7 @@
 """Differentiates the equations of a system exactly, with SymPy.
 
-The derivative of a discontinuity is taken as zero.
+The derivative of a discontinuity is taken as zero, and so is that of a root of what is limited to
+positive values, as of a flow under a pressure, where nothing is left of it: it would be infinite.
 """
 
 from collections.abc import Iterable, Sequence
@@ -69,8 +70,17 @@ def _by_rules(expression: sympy.Expr, by: sympy.Symbol) -> sympy.Expr:
     steps = {step: sympy.Dummy(real=True) for step in expression.atoms(sympy.floor)}
     back = {dummy: step for step, dummy in steps.items()}
     slope = sympy.diff(expression.xreplace(steps), by).xreplace(back)
+    slope = slope.replace(
+        _is_of_ended_root, lambda root: sympy.Piecewise((root, root.base > 0), (0, True))
+    )
     # A jump's impulse has no value at a sample, and a step needs one at zero.
     if not slope.has(sympy.DiracDelta, sympy.Heaviside):
         return slope
     slope = slope.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
     return slope.replace(sympy.Heaviside, lambda at, *_: sympy.Piecewise((1, at > 0), (0, True)))
+
+
+def _is_of_ended_root(term: sympy.Expr) -> bool:
+    """Whether a term is the slope of a root whose radicand has an end at zero, without its sign."""
+    rooted = term.is_Pow and term.exp.is_negative and term.exp.is_integer is False
+    return bool(rooted and term.base.has(sympy.Max, sympy.Min, sympy.Abs, sympy.Piecewise))

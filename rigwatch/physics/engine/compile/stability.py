@@ -44,7 +44,8 @@ def even_substeps(
     for at in (states, standing):
         probes = [0.0] * len(system.probes)
         asked = function(0.0, 0.0, *at.T, *inputs.T, *parameters, *probes, *late.T)
-        sizes = [float(np.nanmax(np.abs(rate))) for rate in asked]
+        known_at = [(np.abs(rate), ~np.isnan(rate)) for rate in asked]
+        sizes = [float(np.max(size, initial=0.0, where=told)) for size, told in known_at]
         steep, bounded = len(wanted.crossing), len(sizes) - wanted.bounded
         steps = [size / COARSER for size in sizes[:steep]]
         steps += [FINER * size for size in sizes[steep:bounded]]
