@@ -30,7 +30,7 @@ from rigwatch.workbench.data.proposals import (
 )
 from rigwatch.workbench.data.recorded_columns import read_columns
 from rigwatch.workbench.data.repeats import repeat_along_motion, repeat_of
-from rigwatch.workbench.data.signal_scales import port_sizes
+from rigwatch.workbench.data.scales import port_sizes, simulated_states
 from rigwatch.workbench.data.signals import UNFILLED, Data, MotionSensor, parameters_of, prepare
 
 __all__ = [
@@ -64,6 +64,7 @@ __all__ = [
     "read_columns",
     "repeat_along_motion",
     "repeat_of",
+    "simulated_states",
     "unchanging",
     "with_elements",
     "with_next_rows",

@@ -6,7 +6,7 @@ from msgspec import structs
 
 from rigwatch.physics.engine.equations import Placement
 from rigwatch.physics.engine.fit import Recording
-from rigwatch.workbench.data.signal_scales import port_sizes
+from rigwatch.workbench.data.scales import port_sizes
 from rigwatch.workbench.study import Element, Study, elements_of, varied
 
 

@@ -73,6 +73,8 @@ OPEN = ("undetermined", "unknown_effect", "model_inadequate")
 """Verdicts that name no effect, and do not say that none is missing."""
 BY_CHANCE = 0.05
 """Probability below which a rarer effect's score is more than chance."""
+HALF = 0.5
+"""Share of an effect's error above noise that a rarer one in its place may leave."""
 SECOND_PASS = "the effect was found in a second pass"
 TWO_BEYOND_BASE = "two effects at once on a base that was searched for are not told from others"
 
@@ -193,10 +195,10 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
 
     An effect that is named although it leaves much may be the likeness of a rarer one, as friction
     is of friction behind a gap. What is found has to leave nothing and, in place of an effect that
-    is named, half its error at most. Effects are fitted again only if the score of a rarer one,
-    corrected for the number of all, is more than chance. Where nothing held out is missing, the
-    training must certainly ask for it. Where a healthy recording checks a model along its measured
-    motion, rarer ones are tried as refinements already, and fits take long.
+    is named, half its error above noise at most. Effects are fitted again only if the score of a
+    rarer one, corrected for the number of all, is more than chance. Where nothing held out is
+    missing, the training must certainly ask for it. Where a healthy recording checks a model along
+    its measured motion, rarer ones are tried as refinements already, and fits take long.
     """
     bench, told = first.bench, first.explanation
     rarer = suitable(bench.study)[1]
@@ -269,13 +271,17 @@ def _trains_better(first: Explained, row: Ranked) -> bool:
 
 
 def _may_replace(first: Explained, row: Ranked) -> bool:
-    """Whether an effect leaves at most half the error of what was named before, if any was."""
-    named = first.explanation.verdict in STRENGTH_TOLD
-    return row.accepted and not (named and row.held_out_error > first.rows[0].held_out_error / 2)
+    """Whether an effect leaves at most half the error above noise of what was named, if any was."""
+    if not row.accepted or first.explanation.verdict not in STRENGTH_TOLD:
+        return row.accepted
+    before, after = first.rows[0].fitted, row.fitted
+    if before is None or after is None:
+        return False
+    return first.bench.floor.left_over(before.held_out, after.held_out) <= HALF**2
 
 
 def _halves(first: Explained, second: Explained) -> bool:
-    """Whether what is named leaves at most half the error of what was named before, if any was."""
+    """Whether what is named leaves at most half the error above noise of what was named before."""
     return bool(second.explanation.beside) or _may_replace(first, second.rows[0])
 
 

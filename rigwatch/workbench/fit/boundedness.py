@@ -8,13 +8,11 @@ under a motion larger than the healthy one.
 from collections.abc import Mapping
 
 import numpy as np
-from msgspec import structs
 
-from rigwatch.physics.engine.compile import compile_system
-from rigwatch.physics.engine.equations import Model, Output, compose
+from rigwatch.physics.engine.equations import Model
 from rigwatch.physics.engine.fit import Recording
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.workbench.data import port_sizes
+from rigwatch.workbench.data import port_sizes, simulated_states
 from rigwatch.workbench.fit.fitted import Fitted
 
 MOTION_GAIN = 1.2
@@ -74,21 +72,12 @@ class BoundednessTest:
 
 def _state_sizes(fitted: Fitted, recording: Recording) -> dict[str, float]:
     """Rms of the hidden states that a model simulates, by name."""
-    model, values = fitted.compiled.system.model, fitted.train.values()
-    parameters = {
-        name: structs.replace(p, value=values[name], fixed=True, kept=False)
-        for name, p in model.parameters.items()
-    }
-    ports = {name: port for name, port in model.ports.items() if port.kind != "sensor"}
-    outputs = {name: Output(unit=s.unit, expression=name) for name, s in model.states.items()}
-    shown = structs.replace(model, parameters=parameters, ports=ports, outputs=outputs)
-    compiled = compile_system(compose(shown))
-    run = compiled.simulate(
-        recording.inputs, recording.spacing, np.zeros(1, np.int64), len(recording),
-        initial=np.zeros((1, len(model.states))), parameters=compiled.parameters,
-        substeps=fitted.substeps,
+    model = fitted.compiled.system.model
+    run = simulated_states(
+        model, recording, fitted.train.values(),
+        initial=np.zeros(len(model.states)), substeps=fitted.substeps,
     )  # fmt: skip
-    sizes = np.sqrt(np.mean(run.outputs[0, len(recording) // SETTLING_PARTS :] ** 2, axis=0))
+    sizes = np.sqrt(np.mean(run[len(recording) // SETTLING_PARTS :] ** 2, axis=0))
     return dict(zip(model.states, sizes.tolist(), strict=True))
 
 

@@ -256,11 +256,11 @@ def initial_states(system: System, recording: Recording, smoothed: int = 11) -> 
                     found[part, index] = filled(measured)
         elif state.rate_of in channels:
             for part, dt in zip(recording.slices, recording.own_spacings, strict=True):
-                found[part, index] = _rate(channels[state.rate_of][part], smoothed, dt)
+                found[part, index] = rate_of_change(channels[state.rate_of][part], smoothed, dt)
     return found
 
 
-def _rate(channel: FloatArray, smoothed: int, dt: float) -> FloatArray:
+def rate_of_change(channel: FloatArray, smoothed: int, dt: float) -> FloatArray:
     """Rate of change over an odd number of samples; zeros for a channel too short for it."""
     width = min(smoothed, len(channel) - 1 + len(channel) % 2)
     if width < 5:

@@ -1,0 +1,117 @@
+"""Sizes of the signals at each port, to which initial values and bounds of effects are scaled."""
+
+from functools import cached_property
+
+import numpy as np
+from scipy.signal import detrend
+
+from rigwatch.physics.engine.compile import evaluated
+from rigwatch.physics.engine.equations import (
+    Model,
+    Port,
+    arriving,
+    compose,
+    names_reached,
+    spelt_out,
+)
+from rigwatch.physics.engine.fit import Recording, initial_states, shown_states
+from rigwatch.physics.engine.score import sizes_at_port
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.workbench.data.scales.shown_signals import ShownSignals
+from rigwatch.workbench.data.scales.simulated_states import simulated_states
+
+Sizes = dict[str, float]
+VARIABLE = "port variable"
+
+
+def port_sizes(model: Model, recording: Recording) -> dict[str, Sizes]:
+    """Root mean square of each port's variables on the recording.
+
+    In addition to the port's own variables there are `dt`, the sample period [s], and, at a signal
+    port, `u` and `rate`, the rms of the signal and of its rate of change.
+    """
+    signals = _PortSignals(spelt_out(model), recording)
+    return {name: signals.sizes(name) for name in model.ports}
+
+
+class _PortSignals:
+    """Signals at the ports of a model: as measured, computed from that, or simulated.
+
+    Args:
+        model: its quantities spelt out.
+        recording: for it.
+    """
+
+    def __init__(self, model: Model, recording: Recording) -> None:
+        self._model, self._recording = model, recording
+        self._system = compose(model)
+        self._values = {name: p.value for name, p in model.parameters.items()}
+        shown = shown_states(self._system)
+        self._hidden = {n for index, n in enumerate(self._system.states) if index not in shown}
+        self._shown = ShownSignals(self._system, recording)
+        self._states = initial_states(self._system, recording)
+        self._measured = self._known(self._states)
+
+    def sizes(self, name: str) -> Sizes:
+        """Root mean squares at a port."""
+        port = self._model.ports[name]
+        variables = {n: self._variable(v.expression) for n, v in port.variables.items()}
+        if "v" in variables and ("x" not in variables or self._is_unknown(port, "x")):
+            variables["x"] = _travel(variables["v"], self._recording)
+        signal = self._arriving(port) if port.signal else None
+        return sizes_at_port(variables, signal, self._recording.dt)
+
+    def _arriving(self, port: Port) -> FloatArray:
+        """The signal at an actuator or sensor, simulated where nothing of it is measured."""
+        found = self._signal(port, self._measured)
+        return found if np.any(found) else self._signal(port, self._simulated)
+
+    def _known(self, states: FloatArray) -> dict[str, FloatArray]:
+        found = dict(zip(self._model.states, states.T, strict=True))
+        found |= dict(zip(self._model.inputs, self._recording.inputs.T, strict=True))
+        found |= dict(zip(self._model.outputs, self._recording.outputs.T, strict=True))
+        for name in self._system.ports:
+            found[name] = self._signal(self._model.ports[name], found)
+        return found
+
+    def _signal(self, port: Port, signals: dict[str, FloatArray]) -> FloatArray:
+        """What arrives at a port, measured or computed from what is; 0 at a force port."""
+        if port.kind == "force":
+            return np.zeros(len(self._recording))
+        if port.signal in signals:
+            return signals[port.signal]
+        return evaluated(
+            arriving(self._model, port), signals, self._values, f"port signal {port.signal}"
+        )
+
+    def _variable(self, text: str) -> FloatArray:
+        """One variable of a port, shape (n,)."""
+        shown = self._shown.of(text, VARIABLE) if self._names_hidden(text) else None
+        if shown is not None:
+            return shown
+        found = evaluated(text, self._measured, self._values, VARIABLE)
+        # What nobody measures stays at its initial value, and has no size if that is zero.
+        if self._names_hidden(text) and not np.any(found):
+            return evaluated(text, self._simulated, self._values, VARIABLE)
+        return found
+
+    def _names_hidden(self, text: str) -> bool:
+        return bool(names_reached(self._model, text, VARIABLE) & self._hidden)
+
+    def _is_unknown(self, port: Port, variable: str) -> bool:
+        """Whether a variable is one that no channel shows, such as the twist of a shaft."""
+        text = port.variables[variable].expression
+        return self._names_hidden(text) and self._shown.of(text, VARIABLE) is None
+
+    @cached_property
+    def _simulated(self) -> dict[str, FloatArray]:
+        """The signals with the states of a run at the model's starting values."""
+        run = simulated_states(self._model, self._recording, self._values, initial=self._states[0])
+        return self._known(run)
+
+
+def _travel(speed: FloatArray, recording: Recording) -> FloatArray:
+    """Displacement: the integral of a speed with its drift removed, shape (n,)."""
+    ends = np.cumsum(recording.parts or (len(recording),))[:-1]
+    pieces = np.split(np.nan_to_num(speed), ends)
+    return np.concatenate([detrend(np.cumsum(piece)) for piece in pieces]) * recording.spacing
