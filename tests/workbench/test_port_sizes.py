@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from rigwatch.physics.engine.equations.effect_files import library
-from rigwatch.physics.engine.equations.model import shipped_models
+from rigwatch.physics.engine.equations.model import Model, shipped_models
 from rigwatch.physics.engine.fit import Recording
+from rigwatch.wire.typed_files.loading import parse
 from rigwatch.workbench.data import port_sizes
 
 RATE = 500.0
@@ -36,3 +37,42 @@ def test_a_measured_position_has_its_own_size() -> None:
     read = np.column_stack([0.2 + 0.1 * np.sin(TIME), np.cos(TIME)])
     sizes = port_sizes(model, Recording(1 / RATE, np.ones((len(TIME), 1)), read))
     assert sizes["load"]["x"] == pytest.approx(np.sqrt(np.mean(read[:, 0] ** 2)))
+
+
+STRUT = """
+name = "strut"
+summary = "two bodies on a strut, of which its travel alone is measured"
+inputs.push = { unit = "N" }
+states.xb = { unit = "m", derivative = "vb" }
+states.vb = { unit = "m/s", derivative = "(push - pull)/m" }
+states.xw = { unit = "m", derivative = "vw" }
+states.vw = { unit = "m/s", derivative = "(pull - spring*xw - drag*vw + ground)/m" }
+quantities.pull = { expression = "k*(xb - xw) - strut", unit = "N" }
+parameters.k = { value = 40.0, unit = "N/m" }
+parameters.m = { value = 1.0, unit = "kg" }
+parameters.spring = { value = 50.0, unit = "N/m" }
+parameters.drag = { value = 1.0, unit = "N s/m" }
+outputs.travel = { unit = "m", expression = "2*(xw - xb)" }
+[ports.strut]
+kind = "force"
+unit = "N"
+variables.x = { expression = "xb - xw", unit = "m" }
+variables.v = { expression = "vb - vw", unit = "m/s" }
+[ports.ground]
+kind = "force"
+unit = "N"
+variables.x = { expression = "xw", unit = "m" }
+variables.v = { expression = "vw", unit = "m/s" }
+"""
+
+
+def test_a_measured_difference_has_its_size_and_what_nobody_measures_that_of_a_run() -> None:
+    model = parse(STRUT, Model, "strut")
+    push = np.sin(2 * np.pi * 2.0 * TIME)
+    travel = 2 * 0.05 * np.sin(2 * np.pi * 2.0 * TIME)
+    sizes = port_sizes(model, Recording(1 / RATE, push[:, None], travel[:, None]))
+    assert sizes["strut"]["x"] == pytest.approx(0.05 / np.sqrt(2), rel=0.01)
+    assert sizes["strut"]["v"] == pytest.approx(4 * np.pi * 0.05 / np.sqrt(2), rel=0.01)
+    # A push of 1 N moves what stands on a spring of 50 N/m by some centimetres, and not by a metre.
+    assert 1e-3 < sizes["ground"]["x"] < 0.1
+    assert sizes["ground"]["v"] < 1.0

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.fit import Fitted
-from rigwatch.workbench.ranking import EXPLAINED, Ranked, left_over
+from rigwatch.workbench.ranking import EXPLAINED, NEAR, Ranked, left_over
 
 LITTLE = 1 / 3
 """Share of the energy above the quiet band that the missing effect must explain; one of three
@@ -18,6 +18,7 @@ LITTLE_BESIDE = 1 / 2
 two that are left explains that much."""
 LITTLE_IN_TRAINING = LITTLE / 2
 """The same of the training, which excites a missing effect about as much as what is held out."""
+AGAIN = "explain again once it is added"
 MENTIONED = 3
 """Number of further accepted effects that are listed."""
 
@@ -75,16 +76,18 @@ def shows_little_of_it(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
 
 
 def remaining_error(base: Fitted, row: Ranked, floor: NoiseFloor) -> str:
-    """`remaining_share` in words, and of which error; empty at the noise floor."""
+    """`remaining_share` in words, and of which error; empty near the noise floor."""
     assert row.fitted is not None
     held_out = _remaining_held_out(base, row, floor)
     train = _remaining_in_training(base, row, floor)
     share, of, fitted = held_out, "error", row.fitted.held_out
     if train > held_out:
         share, of, fitted = train, "training error", row.fitted.train
-    times = floor.ratio(fitted)
-    left = f"; {share:.0%} of the {of}'s energy remains, {times:.2g} times the noise floor"
-    return left if share else ""
+    times = floor.times(fitted)
+    if share:
+        return f"; {share:.0%} of the {of}'s energy remains, {times:.2g} times the noise floor"
+    above = floor.own_error is None and floor.ratio(fitted) > NEAR
+    return f"; what is left is {times:.2g} times the noise floor: {AGAIN}" if above else ""
 
 
 def _remaining_held_out(base: Fitted, row: Ranked, floor: NoiseFloor) -> float:

@@ -232,15 +232,15 @@ def _margin(best: Ranked, rows: Sequence[Ranked], confused: tuple[str, ...]) -> 
 
 
 def _nothing_found(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
-    ratio = floor.ratio(base.held_out)
-    text = f"the held-out error is {ratio:.2f} times the noise floor, and no effect lowers it"
+    ratio, times = floor.ratio(base.held_out), floor.times(base.held_out)
+    text = f"the held-out error is {times:.2f} times the noise floor, and no effect lowers it"
     if floor.reached(base.held_out):
         return Verdict("nothing_missing", None, (), (), text)
     noise = _like_noise(rows, floor)
     # With effects in the model, a little above the least that the noise can be tells nothing.
     if base.placements and noise and ratio < NEAR:
         return Verdict("nothing_missing", None, (), (), text + noise)
-    text = f"the held-out error is {ratio:.2f} times the noise floor, and no "
+    text = f"the held-out error is {times:.2f} times the noise floor, and no "
     text += "known effect lowers it" if rows else "further known effect suits the model's ports"
     fitted = [row for row in rows if row.fitted is not None]
     if fitted:

@@ -1,13 +1,14 @@
 """Decides from the held-out recordings whether an effect is accepted.
 
-The held-out error must fall by more than chance and by a material amount, and the training fit must
-show that the effect's strength differs from zero: by its interval, or by the training error without
-the effect where it vanishes with its strength. The interval follows the slopes at the fit, which
-vanish where a strength saturates, as the resistance of a drive that limits its current hard does,
-and may then reach back to zero (W. W. Hauck, A. Donner, Journal of the American Statistical
-Association 72, 1977). An effect can vanish, so a fit that is worse in
-training than the one without it has ended in a local minimum, and what it does to the held-out
-recordings says nothing.
+The held-out error must fall by more than chance and by a material amount. Where a single event
+shows an effect, as a stop that is hit once, there are no blocks whose signs could tell chance:
+there it must halve the error of the training and that of the held-out recordings. The training fit
+must show that the effect's strength differs from zero: by its interval, or by the training error
+without the effect where it vanishes with its strength. The interval follows the slopes at the fit,
+which vanish where a strength saturates, as the resistance of a drive that limits its current hard
+does, and may then reach back to zero (W. W. Hauck, A. Donner, Journal of the American Statistical
+Association 72, 1977). An effect can vanish, so a fit that is worse in training than the one without
+it has ended in a local minimum, and what it does to the held-out recordings says nothing.
 """
 
 from functools import cache
@@ -25,6 +26,9 @@ MATERIAL = 0.03
 """Smallest relative fall of the held-out error that justifies an effect."""
 STEP = 0.025
 """One-sided level at which the held-out error must fall."""
+HALVED = 0.5
+"""Fall of the error, in training and held out alike, that is no chance however few blocks show it:
+the strength and the instant of an event that training did not see are predicted."""
 EXPLAINED = 0.95
 """Share of the energy above the floor that an effect must explain to account for the error."""
 
@@ -39,7 +43,8 @@ def judge_fit(base: Fitted, row: Ranked) -> None:
     """
     assert row.fitted is not None
     found = difference(base.held_out, row.fitted.held_out)
-    row.gain, row.reason, row.vague = found.mean, _refused(found), False
+    trained = 1 - row.fitted.train_error / max(base.train_error, 1e-300)
+    row.gain, row.reason, row.vague = found.mean, _refused(found, trained), False
     if row.fitted.train_error > (1 + MATERIAL) * base.train_error:
         row.reason = "its fit ended in a local minimum: the training error rises"
     if not row.reason and (vague := _undetermined_strength(base, row)) is not None:
@@ -48,12 +53,17 @@ def judge_fit(base: Fitted, row: Ranked) -> None:
     row.reason = row.reason or "held-out error falls"
 
 
-def _refused(found: Difference) -> str:
-    """Why the held-out error does not support an effect; empty if it does."""
+def _refused(found: Difference, trained: float) -> str:
+    """Why the held-out error does not support an effect; empty if it does.
+
+    Args:
+        found: fall of the held-out error.
+        trained: relative fall of the training error.
+    """
     if found.mean <= 0:
         more = "" if found.p_rises < STEP else ", no more than by chance"
         return f"held-out error rises{more}"
-    if found.p_falls >= STEP:
+    if found.p_falls >= STEP and min(found.relative, trained) < HALVED:
         return "held-out error falls no more than by chance"
     return "" if found.relative > MATERIAL else f"held-out error falls by less than {MATERIAL:.0%}"
 

@@ -99,6 +99,7 @@ def _file(files: NewFiles, logs: Logs, model: Model, reading: Matched) -> tuple[
             never = f"; {', '.join(still)} never changes there" if still else ""
             choices.append(f"{use.replace('_', ' ')}: {_in_words(logs, part)}{never}")
     for path in logs.healthy:
+        choices.append(f"healthy: {path.name}")
         lines += _span("healthy", path.stem, Part(0), logs)
     return "\n".join(lines) + "\n", [*choices, *_not_fitted(logs, model), *_not_held(logs, model)]
 

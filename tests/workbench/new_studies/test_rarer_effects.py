@@ -27,6 +27,11 @@ def stop_below(x: np.ndarray, v: np.ndarray) -> np.ndarray:
     return 60 * np.minimum(x + 0.011, 0.0)
 
 
+def far_stop_below(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """A rubber stop at three times the usual stroke, which a resonance reaches now and then."""
+    return 60 * np.minimum(x + 0.033, 0.0)
+
+
 def soft_stop_below(x: np.ndarray, v: np.ndarray) -> np.ndarray:
     """A soft stop on one side, which a stop on both sides and a bent spring make up together."""
     return 2 * np.minimum(x + 0.011, 0.0)
@@ -56,10 +61,16 @@ def weak_gap(x: np.ndarray, v: np.ndarray) -> np.ndarray:
     return 0.01 * behind_gap(x, v)
 
 
-def logged(path: Path, seed: int, law: Law | None = None, stroke: float = 0.01) -> str:
-    """A damper with a force by a law, or one that something else pushes at random, slowly."""
+def logged(
+    path: Path, seed: int, law: Law | None = None, stroke: float = 0.01, burst: float = 0.0
+) -> str:
+    """A damper with a force by a law, or one that something else pushes at random, slowly.
+
+    For a second its stroke is larger, by `burst` times the usual.
+    """
     draws = np.random.default_rng(seed).normal(size=(2, 1500))
     t = np.arange(1500) / 100
+    stroke = stroke * (1.0 + burst * np.exp(-(((t - 7.0) / 0.7) ** 2)))
     x = stroke * (np.sin((2 + 0.3 * seed) * t) + np.sin(3.3 * t + 0.05 * t**2 + seed))
     v = np.gradient(x, 0.01)
     hidden = scipy.signal.lfilter([0.1], [1, -0.9], draws[0]) if law is None else law(x, v)
@@ -125,6 +136,23 @@ def test_a_rarer_effect_is_named_in_a_second_pass(
     assert f"it was found among {rarer} rarer effects, as no usual one explains the error" in out
     assert "the probability of being wrong is unknown: the effect was found in a second" in out
     assert f"next: rigwatch add {folder} {name} --port load" in out
+
+
+def test_a_stop_that_is_rarely_reached_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "damper.toml").write_text(WITH_OIL)
+    logs = [logged(tmp_path / f"run{seed}.csv", seed, far_stop_below, burst=2.5) for seed in (1, 6)]
+    folder, model = tmp_path / "study", tmp_path / "damper.toml"
+    assert main(["study", "new", f"{folder}", "--data", *logs, "--model", f"{model}"]) == 0
+    capsys.readouterr()
+    assert main(["explain", f"{folder}", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    best = found["ranking"][0]
+    assert found["verdict"] == "missing_effect"
+    assert best["effect"] == "stop_below"
+    assert best["parameters"]["xs"]["value"] == pytest.approx(0.033, rel=0.02)
+    assert best["parameters"]["k"]["value"] == pytest.approx(60.0, rel=0.05)
 
 
 @pytest.mark.parametrize(

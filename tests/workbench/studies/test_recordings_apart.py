@@ -101,20 +101,23 @@ def late(seed: int, lag: float) -> dict[str, np.ndarray]:
     return {"x": x[::10], "v": v[::10], "force": told[::10] + noise}
 
 
-def test_a_load_cell_that_is_late_is_named_beside_a_model_without_states(tmp_path: Path) -> None:
+@pytest.mark.parametrize("lag", [0.02, 0.8])
+def test_a_load_cell_that_is_late_is_named_beside_a_model_without_states(
+    tmp_path: Path, lag: float
+) -> None:
     cell = DAMPER.replace("c*v - load", "c*v + k*x - load").replace(
         'N*s/m" }', 'N*s/m" }\nparameters.k = { value = 20.0, unit = "N/m" }'
     )
     cell += '[ports.cell]\nkind = "sensor"\nsignal = "force"\n'
-    study = studied(tmp_path, cell, [late(1, 0.02), late(2, 0.02)], [late(3, 0.02)], UNITS)
+    study = studied(tmp_path, cell, [late(1, lag), late(2, lag)], [late(3, lag)], UNITS)
 
     found = explain(study)
 
     assert found.verdict == "missing_effect"
     best = found.ranking[0]
     assert "lag@cell" in {f"{best.effect}@{best.port}", *best.class_}
-    lag = next(row for row in found.ranking if row.effect == "lag")
-    assert lag.parameters["tau"].value == pytest.approx(0.02, rel=0.05)
+    late_by = next(row for row in found.ranking if row.effect == "lag").parameters["tau"].value
+    assert late_by == pytest.approx(lag, rel=0.05)
 
 
 LOAD_CELL = DAMPER + '[ports.cell]\nkind = "sensor"\nsignal = "force"\n'

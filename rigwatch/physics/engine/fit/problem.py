@@ -341,6 +341,15 @@ class Problem:
         alone = [thinning.of_part(n).apply(np.zeros((1, n, 1))) for n in parts]
         return tuple(each.shape[1] for each in alone)
 
+    def _where(self, window: int) -> str:
+        """Which part of the recordings a window is, in words."""
+        first, recording = self._cut.starts[window], self.recording
+        number = int(np.searchsorted([part.start for part in recording.slices], first, "right"))
+        since = first - recording.slices[number - 1].start
+        dt = recording.own_spacings[number - 1]
+        of = f" of recording {number}" if len(recording.slices) > 1 else ""
+        return f"from {since * dt:.4g} to {(since + self._cut.length) * dt:.4g} s{of}"
+
     def whole_recording(self, windowed: FloatArray) -> FloatArray:
         """Values of all windows, (windows, samples, …), in the layout of `Fit`."""
         return self._cut.whole(windowed, self._lengths)
@@ -410,9 +419,11 @@ class Problem:
         best = self.initial[rows]
         error, slopes = self.simulated(parameters, rows, best)
         if not (np.isfinite(slopes).all() and np.isfinite(error).all()):
+            finite = np.isfinite(error).all(axis=1) & np.isfinite(slopes).all(axis=(1, 2))
             raise ModelError(
-                f"{self.system.model.name}: the simulation diverged (NaN or infinite);"
-                " try other starting values or more substeps"
+                f"{self.system.model.name}: the simulation diverged (NaN or infinite)"
+                f" {self._where(rows[~finite][0])}; expected equations that stay finite there,"
+                " other values under [start] or more `substeps`"
             )
         if not self.system.states:
             return error, slopes

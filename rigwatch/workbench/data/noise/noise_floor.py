@@ -91,6 +91,14 @@ class NoiseFloor:
         rms = fitted.rms if at is None else fitted.rms_at(at)
         return float(np.sqrt(np.mean((rms / self.rms) ** 2)))
 
+    def times(self, fitted: Fit) -> float:
+        """Error over the floor as a reader divides them: both over all channels, as they are told.
+
+        That differs from `ratio` where the floor is not the same share of each channel's scale.
+        """
+        error, least = (np.mean((rms / fitted.scale) ** 2) for rms in (fitted.rms, self.rms))
+        return float(np.sqrt(error / least))
+
     def above(self, fitted: Fit) -> float:
         """Share of the error's energy that is above the floor."""
         return max(1 - self.ratio(fitted) ** -2, 0.0)
