@@ -16,6 +16,7 @@ from rigwatch.workbench.study.elements import with_element
 MODEL = shipped_models()["motor"]
 TAU, LIMIT, COMMAND, DT = 0.05, 4.0, 10.0, 0.01
 SPACING = np.full(100, DT)
+TIMES = DT * np.arange(100)
 VALUES = {"drive_lag_tau": TAU, "drive_saturation_us": LIMIT, "drive_saturation_w": 1.0}
 
 
@@ -33,7 +34,7 @@ def led(*placements: Placement) -> np.ndarray:
     parameters = compile_system(system).vector(VALUES)
     inputs = np.full((100, 1), COMMAND)
     recall = RecordedEffectStates(
-        system, inputs, np.zeros((100, len(system.states))), SPACING, parameters
+        system, inputs, np.zeros((100, len(system.states))), TIMES, SPACING, parameters
     )
     (column,) = recall.columns
     return recall.at(parameters)[column]
@@ -67,7 +68,7 @@ def test_what_follows_another_memory_is_not_led_by_the_inputs_alone():
     system = compose(MODEL, (LAG, placed("rate_limit")))
     inputs = np.full((100, 1), COMMAND)
     recall = RecordedEffectStates(
-        system, inputs, np.zeros((100, len(system.states))), SPACING,
+        system, inputs, np.zeros((100, len(system.states))), TIMES, SPACING,
         compile_system(system).parameters,
     )  # fmt: skip
     names = list(system.states)

@@ -22,6 +22,8 @@ from rigwatch.workbench.data.scales.simulated_states import simulated_states
 
 Sizes = dict[str, float]
 VARIABLE = "port variable"
+MOTION = ("x", "v")
+"""Variables of which one unit, the size of what has none, is far from what machines do."""
 
 
 def port_sizes(model: Model, recording: Recording) -> dict[str, Sizes]:
@@ -55,16 +57,11 @@ class _PortSignals:
     def sizes(self, name: str) -> Sizes:
         """Root mean squares at a port."""
         port = self._model.ports[name]
-        variables = {n: self._variable(v.expression) for n, v in port.variables.items()}
+        variables = {n: self._variable(n, v.expression) for n, v in port.variables.items()}
         if "v" in variables and ("x" not in variables or self._is_unknown(port, "x")):
             variables["x"] = _travel(variables["v"], self._recording)
-        signal = self._arriving(port) if port.signal else None
+        signal = self._signal(port, self._measured) if port.signal else None
         return sizes_at_port(variables, signal, self._recording.dt)
-
-    def _arriving(self, port: Port) -> FloatArray:
-        """The signal at an actuator or sensor, simulated where nothing of it is measured."""
-        found = self._signal(port, self._measured)
-        return found if np.any(found) else self._signal(port, self._simulated)
 
     def _known(self, states: FloatArray) -> dict[str, FloatArray]:
         found = dict(zip(self._model.states, states.T, strict=True))
@@ -84,14 +81,14 @@ class _PortSignals:
             arriving(self._model, port), signals, self._values, f"port signal {port.signal}"
         )
 
-    def _variable(self, text: str) -> FloatArray:
+    def _variable(self, name: str, text: str) -> FloatArray:
         """One variable of a port, shape (n,)."""
         shown = self._shown.of(text, VARIABLE) if self._names_hidden(text) else None
         if shown is not None:
             return shown
         found = evaluated(text, self._measured, self._values, VARIABLE)
-        # What nobody measures stays at its initial value, and has no size if that is zero.
-        if self._names_hidden(text) and not np.any(found):
+        # A motion that nobody measures stays at its initial value, which is no size if it is zero.
+        if name in MOTION and self._names_hidden(text) and not np.any(found):
             return evaluated(text, self._simulated, self._values, VARIABLE)
         return found
 
