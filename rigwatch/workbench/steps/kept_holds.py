@@ -7,7 +7,14 @@ in the model, before it is written to the study.
 
 from rigwatch.workbench.compare import Bench, Warm, with_horizon_of
 from rigwatch.workbench.fit import held_as
-from rigwatch.workbench.study import RECORDINGS, Accepted, Study, append_effect, keep_holds
+from rigwatch.workbench.study import (
+    RECORDINGS,
+    Accepted,
+    Study,
+    append_effect,
+    keep_holds,
+    without_chosen_holds,
+)
 
 
 def with_kept_holds(study: Study, accepted: Accepted, bench: Bench, warm: Warm) -> Study:
@@ -25,7 +32,7 @@ def with_kept_holds(study: Study, accepted: Accepted, bench: Bench, warm: Warm) 
         ModelError: data have changed, or a fit fails.
     """
     before = bench.study.holds
-    plain = with_horizon_of(study, bench.study)
+    plain = with_horizon_of(without_chosen_holds(study), bench.study)
     as_before = append_effect(keep_holds(held_as(plain, before)), accepted)
     # A hold chosen from a healthy recording does not depend on the effects.
     if not any(held.source == RECORDINGS for held in before.values()):

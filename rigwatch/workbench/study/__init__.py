@@ -9,6 +9,7 @@ from rigwatch.workbench.study.edits import (
     use_effect_file,
     use_model_file,
     use_variants,
+    without_chosen_holds,
 )
 from rigwatch.workbench.study.elements import Element, elements_of, written_variants
 from rigwatch.workbench.study.folder import FILE, LEDGER, digest
@@ -86,5 +87,6 @@ __all__ = [
     "use_model_file",
     "use_variants",
     "varied",
+    "without_chosen_holds",
     "written_variants",
 ]

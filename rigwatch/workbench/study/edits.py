@@ -10,7 +10,7 @@ from dataclasses import replace
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.study.folder import FILE
 from rigwatch.workbench.study.own_files import unsaved
-from rigwatch.workbench.study.study import GIVEN, Study, converted, study_of
+from rigwatch.workbench.study.study import GIVEN, RECORDINGS, Study, converted, study_of
 from rigwatch.workbench.study.study_file import Accepted
 
 _TABLE = "\n[[effects]]\n"
@@ -20,8 +20,9 @@ _OTHER = re.compile(r"(?m)^[ \t]*\[(?!\[?[ \t]*effects[ \t]*[.\]])")
 _REMARKS = re.compile(r"(\n[ \t]*(#[^\n]*)?)*\Z")
 _LIST = r"\[(?:#[^\n]*|\"[^\"\n]*\"|'[^'\n]*'|[^\]\"'#])*\][^\n]*\n?"
 """A list of texts, on one line or on several."""
-CHOSEN = "  # chosen from the data, with the first effect"
+CHOSEN = "  # chosen from the data"
 """Comment on lines that are written with the first effect and removed with it."""
+_HOLDS = re.compile(rf"(?m)^(hold|late|holds_chosen) = .*{CHOSEN}.*\n")
 
 
 def append_effect(study: Study, accepted: Accepted) -> Study:
@@ -51,6 +52,9 @@ def drop_effect(study: Study) -> Study:
     if not study.file.effects:
         raise ModelError(f"{study.folder}: found no effect to undo")
     text = _without_last_table(study.text)
+    if study.file.holds_chosen:
+        # They were chosen with the effect in the model.
+        text = _HOLDS.sub("", text)
     if len(study.file.effects) == 1:
         text = "".join(line for line in text.splitlines(True) if CHOSEN not in line)
     changed, kept = study_of(study.folder, text), study.file.effects[:-1]
@@ -121,6 +125,13 @@ def _with_list(study: Study, key: str, names: Sequence[str]) -> str:
     return (f"{key} = [{quoted}]\n" if names else "") + kept
 
 
+def without_chosen_holds(study: Study) -> Study:
+    """The study without the holds that were chosen from the recordings, which may be others now."""
+    if not study.file.holds_chosen:
+        return study
+    return study_of(study.folder, _HOLDS.sub("", study.text))
+
+
 def keep_holds(study: Study) -> Study:
     """The study with the holds and the horizon chosen from the data written to its file."""
     chosen = {n: h for n, h in study.holds.items() if h.source not in GIVEN}
@@ -128,9 +139,11 @@ def keep_holds(study: Study) -> Study:
         half = f"half_windows = true{CHOSEN}\n" if study.file.half_windows else ""
         text = f"horizon = {study.file.horizon!r}{CHOSEN}\n{half}" + study.text
         study = replace(study_of(study.folder, text), holds=study.holds)
-    if not chosen or study.file.hold:
+    if not chosen or (study.file.hold and not study.file.holds_chosen):
         return study
+    again = any(held.source == RECORDINGS for held in chosen.values())
     holds = ", ".join(f'{name} = "{held.hold}"' for name, held in chosen.items())
     late = ", ".join(f"{name} = {held.late!r}" for name, held in chosen.items() if held.late)
     lines = f"hold = {{ {holds} }}{CHOSEN}\n" + (f"late = {{ {late} }}{CHOSEN}\n" if late else "")
-    return study_of(study.folder, lines + study.text)
+    lines += f"holds_chosen = true{CHOSEN}\n" if again else ""
+    return study_of(study.folder, lines + _HOLDS.sub("", study.text))

@@ -352,7 +352,8 @@ def _held(model: Model, file: StudyFile) -> tuple[Model, dict[str, Held]]:
         hold, late = file.hold.get(name), file.late.get(name)
         if late is not None:
             hold = hold or "zero"
-        source = "the study" if hold else "the model file"
+        given = RECORDINGS if file.holds_chosen else "the study"
+        source = given if hold else "the model file"
         hold = hold or own.hold or model.hold
         late = own.late if late is None else late
         held = Held(hold, late, 0.0, source) if hold else None

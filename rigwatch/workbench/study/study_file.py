@@ -154,6 +154,13 @@ class StudyFile(Section, frozen=True, kw_only=True):
             " value of the interval that ends there"
         ),
     ] = field(default_factory=dict)
+    holds_chosen: Annotated[
+        bool,
+        Meta(
+            description="whether `hold` and `late` were chosen from the recordings: further effects"
+            " may show that they stand for something slow"
+        ),
+    ] = False
     derive: Derive | None = None
     thin: Thin | None = None
     effect_files: Annotated[

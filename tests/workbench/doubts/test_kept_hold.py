@@ -8,11 +8,14 @@ import pytest
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import parse_model
 from rigwatch.physics.engine.fit.recording import Recording
-from rigwatch.workbench.compare.preparation import bench_of
+from rigwatch.workbench.compare import with_hold_decided
+from rigwatch.workbench.compare.preparation import bench_of, open_bench
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.fit.input_hold import stepped, with_hold
+from rigwatch.workbench.ranking import rank
 from rigwatch.workbench.steps.trial import try_add
+from rigwatch.workbench.study.edits import drop_effect
 from rigwatch.workbench.study.study import Study
 from rigwatch.workbench.study.study_file import Span, StudyFile
 from tests.workbench.machine import studied
@@ -61,6 +64,27 @@ def test_an_input_is_not_late_once_the_slow_sensor_is_in_the_model(tmp_path):
     assert trial.change.before.hold["power"].late > 0.5
     assert (trial.after.file.hold, trial.after.file.late) == ({"power": "zero"}, {})
     assert trial.change.after.held_out_error < 0.06
+    assert trial.after.file.holds_chosen
+    undone = drop_effect(trial.after).file
+    assert (undone.hold, undone.holds_chosen) == ({}, False)
+
+
+@pytest.mark.parametrize(
+    ("keys", "late"),
+    [pytest.param("holds_chosen = true", 0.0, id="chosen"), pytest.param("", 0.95, id="given")],
+)
+def test_a_hold_that_an_earlier_step_chose_is_chosen_again(
+    tmp_path: Path, keys: str, late: float
+) -> None:
+    hold = 'hold = { power = "zero" }\nlate = { power = 0.95 }\n'
+    logs = [[run(seed, 6, slow_s=1.0)] for seed in (1, 2)]
+    made = studied(
+        tmp_path, BLOCK, *logs, {"power": "W", "warmer": "K"}, hold + keys, rates=[1.0, 1.0]
+    )
+    bench = open_bench(made)
+    rows = rank(bench.study, bench.data, bench.base, bench.floor)
+    found = with_hold_decided(bench, rows)
+    assert found.bench.study.holds["power"].late == pytest.approx(late, abs=0.05)
 
 
 def in_memory(steady: int, noise: float = 0.0, **more: float) -> tuple[Study, Data]:
