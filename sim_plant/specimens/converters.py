@@ -83,6 +83,11 @@ def _low_pass(signal: FloatArray, dt: float, constant: float) -> FloatArray:
     return np.asarray(lsim(([1.0], [constant, 1.0]), signal, time, signal[0] * constant)[1])
 
 
+def _early(signal: FloatArray, dt: float) -> FloatArray:
+    """With 15 ms of the rate of change."""
+    return np.asarray(signal + 0.015 * np.gradient(signal, dt))
+
+
 def _late(signal: FloatArray, dt: float) -> FloatArray:
     """Sent 20 ms late."""
     time = dt * np.arange(len(signal))
@@ -127,6 +132,7 @@ OF_ACCELERATION: dict[str, Change] = {
 OF_POSITION: dict[str, Change] = {
     "sensor_play": _played,
     "lag": _filtered,
+    "lead": _early,
     "digital_smoothing": _smoothed,
     "moving_average": _averaged,
     "gain": lambda read, dt: 1.07 * read,

@@ -214,8 +214,8 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
     progress(f"no usual effect explains the error: trying {len(rarer)} rarer ones")
     rows = rank(wider, bench.data, bench.base, bench.floor, progress, known=first.rows)
     none = f"nor does one of {len(rarer)} rarer ones"
-    replaces = _trains_better if by_training else _may_replace
-    if not any(row.effect in rarer and replaces(first, row) for row in rows):
+    leads = _trains_better if by_training else _leaves_less
+    if not any(row.effect in rarer and leads(first, row) for row in rows):
         return _unless_named(first, none)
     second = _explained_once(replace(bench, study=wider), progress, rows, first)
     found = second.explanation
@@ -268,6 +268,12 @@ def _trains_better(first: Explained, row: Ranked) -> bool:
     if before is None or row.fitted is None or row.p_value >= SHOWN:
         return False
     return row.fitted.train_error < (1 - MATERIAL) * before.train_error
+
+
+def _leaves_less(first: Explained, row: Ranked) -> bool:
+    """Whether an effect leaves less than what was named before, alone or in a set that it leads."""
+    named = first.explanation.verdict in STRENGTH_TOLD
+    return row.accepted and not (named and row.held_out_error > first.rows[0].held_out_error)
 
 
 def _may_replace(first: Explained, row: Ranked) -> bool:
