@@ -32,6 +32,11 @@ def far_stop_below(x: np.ndarray, v: np.ndarray) -> np.ndarray:
     return 60 * np.minimum(x + 0.033, 0.0)
 
 
+def stop_and_drag(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """A rubber stop on one side, and a drag that grows with the square of the speed."""
+    return stop_below(x, v) + 60 * v * np.abs(v)
+
+
 def soft_stop_below(x: np.ndarray, v: np.ndarray) -> np.ndarray:
     """A soft stop on one side, which a stop on both sides and a bent spring make up together."""
     return 2 * np.minimum(x + 0.011, 0.0)
@@ -136,6 +141,21 @@ def test_a_rarer_effect_is_named_in_a_second_pass(
     assert f"it was found among {rarer} rarer effects, as no usual one explains the error" in out
     assert "the probability of being wrong is unknown: the effect was found in a second" in out
     assert f"next: rigwatch add {folder} {name} --port load" in out
+
+
+def test_a_rarer_effect_beside_a_usual_one_is_named_with_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "damper.toml").write_text(WITH_OIL)
+    logs = [logged(tmp_path / f"run{seed}.csv", seed, stop_and_drag) for seed in (1, 2)]
+    folder, model = tmp_path / "study", tmp_path / "damper.toml"
+    assert main(["study", "new", f"{folder}", "--data", *logs, "--model", f"{model}"]) == 0
+    capsys.readouterr()
+    assert main(["explain", f"{folder}", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"] == "missing_effect"
+    assert {"stop_below@load", "quadratic_drag@load"} <= set(re.findall(r"\w+@load", found["text"]))
+    assert found["remains"] == 0.0
 
 
 def test_a_stop_that_is_rarely_reached_is_named(

@@ -72,7 +72,8 @@ def _ratio(one: sympy.Expr, other: sympy.Expr) -> float | None:
     """The number by which one expression is a multiple of another; None if it is none."""
     if max(one.count_ops(), other.count_ops()) > MOST_OPERATIONS or not other.free_symbols:
         return None
-    if one.free_symbols != other.free_symbols:
-        return None
+    rational = one.is_rational_function() and other.is_rational_function()
+    if not rational or one.free_symbols != other.free_symbols:
+        return 1.0 if one == other else None
     ratio = sympy.cancel(one / other)
     return float(ratio) if ratio.is_number else None
