@@ -7,7 +7,7 @@ from rigwatch.workbench.compare import Bases, Comparison, Region
 from rigwatch.workbench.explain import Explanation, Row
 from rigwatch.workbench.fit import Value, error_text, shown
 from rigwatch.workbench.steps import Change
-from rigwatch.workbench.study import FILE, GIVEN, Held
+from rigwatch.workbench.study import FILE, GIVEN, Held, told
 
 VERDICTS = {
     "nothing_missing": "nothing is missing",
@@ -342,10 +342,17 @@ def region_lines(found: Sequence[Region], most: int) -> list[str]:
     lines = []
     for channel, view in dict.fromkeys((r.channel, r.view) for r in found):
         regions = [r for r in found if (r.channel, r.view) == (channel, view)][:most]
+        unit = regions[0].told_in
         rows = [
-            [r.name, number(r.rms), number(r.mean), f"{r.share:.0%}", _span(r)] for r in regions
+            [
+                r.name,
+                *(number(told(value, unit) if unit else value) for value in (r.rms, r.mean)),
+                f"{r.share:.0%}",
+                _span(r),
+            ]
+            for r in regions
         ]
-        lines += [f"{channel}, by {view}"]
+        lines += [f"{channel}{f' [{unit}]' if unit else ''}, by {view}"]
         lines += [*table(["where", "rms", "mean", "share of energy", "samples"], rows), ""]
     return lines[:-1]
 

@@ -5,7 +5,7 @@ exceeds the average by more than chance, tested over the blocks that it spans. R
 sample numbers for inspection.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +16,7 @@ from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.workbench.compare.location.recording_time import recording_name, recording_time
 from rigwatch.workbench.compare.preparation import Bench
 from rigwatch.workbench.data import find_period
+from rigwatch.workbench.study import told_unit
 
 PIECES = {"time": 12, "grid": 6, "amplitude": 5, "frequency": 12}
 LEVEL = 0.01
@@ -29,11 +30,11 @@ class Region:
         view: kind of division: time, motion, direction, amplitude, input, frequency, lines.
         name: the part, in words.
         channel: output of the residual.
-        rms: of the residual there, in the channel's unit.
-        mean: of the residual there, in the channel's unit.
+        rms, mean: of the residual there.
         share: of the residual's energy above the noise floor, 0 to 1.
         p_value: of a mean squared residual this far above the average by chance.
         samples: sample numbers, counted through all training recordings; empty for frequencies.
+        told_in: unit in which texts tell rms and mean, which are in SI.
     """
 
     view: str
@@ -44,15 +45,17 @@ class Region:
     share: float
     p_value: float
     samples: IntArray
+    told_in: str = ""
 
 
 def locate(bench: Bench) -> list[Region]:
     """All regions of all views, in each view those with the most energy first."""
     found: list[Region] = []
-    for index, channel in enumerate(bench.study.model.outputs):
+    for index, (channel, output) in enumerate(bench.study.model.outputs.items()):
         residual = bench.base.train.residuals[..., index].ravel()
         floor = float(bench.floor.rms[index])
-        found += _channel(bench, channel, residual, floor)
+        regions = _channel(bench, channel, residual, floor)
+        found += [replace(region, told_in=told_unit(output)) for region in regions]
     return sorted(found, key=lambda region: (region.channel, region.view, -region.share))
 
 
