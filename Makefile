@@ -49,6 +49,7 @@ SYNC := $(if $(filter output-sync,$(.FEATURES)),--output-sync=target)
 # kernels the tests use. The demo's rig then mostly waits, and types are checked in what the tests
 # leave of the cores: both run beside them.
 test:  ## everything that is checked: style, types, layers, demo, tests
+	@echo 'test: about a quarter of an hour on two cores'
 	@$(MAKE) --no-print-directory -j2 $(STAMPS)/run viewer-packages
 	@$(MAKE) --no-print-directory -j6 $(SYNC) unit demo-beside lint sbom FIRST="commissioned tests-read"
 	@if [ -e $(DEMO_FAILED) ]; then $(MAKE) --no-print-directory demo-headless; fi

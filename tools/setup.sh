@@ -66,11 +66,11 @@ progress() {
 
 purpose() {
     case "${1##*/}" in
-    lock.txt) echo "to run it" ;;
-    build.txt) echo "to build it" ;;
-    dev.txt) echo "to check it" ;;
+    lock.txt) echo "to run rigwatch" ;;
+    build.txt) echo "to install rigwatch itself" ;;
+    dev.txt) echo "to check rigwatch" ;;
     mutation.txt) echo "to check its tests" ;;
-    *) echo "to compare it with" ;;
+    *) echo "to compare rigwatch with" ;;
     esac
 }
 

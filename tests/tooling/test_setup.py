@@ -130,7 +130,7 @@ def test_the_set_up_says_how_far_it_is(environment: Path, bare_path: Path, tmp_p
     lock.write_text("".join(f"package{n}==1\n    --hash=sha256:0\n" for n in range(25)))
     done = run_tool("setup.sh", str(environment), str(lock), str(lock), path=bare_path)
     first, *rest = done.stdout.splitlines()
-    assert first == f"setup: 25 packages to run it ({lock})"
+    assert first == f"setup: 25 packages to run rigwatch ({lock})"
     assert [line.split(":")[1].split()[0] for line in rest[:3]] == ["10", "20", "all"]
     assert rest[3:] == [first, *rest[:3]]
     assert (done.returncode, done.stderr) == (0, "")
@@ -147,7 +147,7 @@ def test_packages_that_are_there_already_are_not_counted_again(
     lock.write_text("".join(f"{name}==1 \\\n    --hash=sha256:0\n" for name in names))
     done = run_tool("setup.sh", str(environment), str(lock), path=bare_path)
     # Of package1 another version is there.
-    assert done.stdout.splitlines()[0] == f"setup: 2 packages to check it ({lock})"
+    assert done.stdout.splitlines()[0] == f"setup: 2 packages to check rigwatch ({lock})"
 
 
 def test_only_the_lock_of_the_project_puts_the_project_in_and_is_compiled_as_a_whole(
