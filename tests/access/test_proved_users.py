@@ -69,6 +69,7 @@ def refusal(bus: Bus, command: AlarmCommand) -> str:
     return said[0]
 
 
+@pytest.mark.nightly
 def test_an_operator_acts_in_the_own_name_only_and_a_revoked_one_not_at_all(
     rig: SecuredRig,
 ) -> None:

@@ -127,6 +127,7 @@ def test_a_test_that_fails_leaves_no_requests_to_the_next(page: Page, root: Path
     assert page.requests() <= {page.served.address}
 
 
+@pytest.mark.nightly
 def test_two_servers_of_one_machine_do_not_log_each_other_out(page: Page, root: Path) -> None:
     page.open("/")
     page.find("h1, h2")

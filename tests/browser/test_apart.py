@@ -42,6 +42,7 @@ REQUESTS = 46
 """More than the server has threads for its requests: 40."""
 
 
+@pytest.mark.nightly
 def test_files_that_wait_to_be_read_keep_no_other_page_waiting(
     served: Served,
 ) -> None:

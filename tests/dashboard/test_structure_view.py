@@ -32,6 +32,7 @@ def test_a_damage_is_drawn_with_its_test_instant_and_verdict(record: Path, tmp_p
         assert part in content
 
 
+@pytest.mark.nightly
 def test_an_identification_is_drawn_as_a_picture(
     record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

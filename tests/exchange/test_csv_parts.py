@@ -62,12 +62,10 @@ def peak(rows: int, folder: Path, mapping: ImportMapping) -> int:
             made.unlink()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "mapping",
-    [
-        pytest.param(MAPPED, id="mapped"),
-        pytest.param(ImportMapping(), id="exported", marks=pytest.mark.nightly),
-    ],
+    [pytest.param(MAPPED, id="mapped"), pytest.param(ImportMapping(), id="exported")],
 )
 def test_memory_does_not_grow_with_the_text(tmp_path: Path, mapping: ImportMapping) -> None:
     few, many = 2 * PART, 6 * PART

@@ -53,7 +53,9 @@ def waiting(pipe: int) -> int:
     return int.from_bytes(fcntl.ioctl(pipe, termios.FIONREAD, bytes(4)), sys.byteorder)
 
 
-@pytest.mark.parametrize("output", ["stalled", "closed", "full"])
+@pytest.mark.parametrize(
+    "output", [pytest.param("stalled", marks=pytest.mark.nightly), "closed", "full"]
+)
 def test_the_rig_goes_on_whatever_becomes_of_the_output(output: str, config: Path) -> None:
     reading, writing = os.pipe()
     fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, 4096)

@@ -65,6 +65,7 @@ def nothing_is_judged(field: Field, boot: int, since: int) -> None:
     assert field.journalled("reference_learnt") == []
 
 
+@pytest.mark.nightly
 def test_15_a_drive_in_the_wrong_unit(tmp_path: Path) -> None:
     for field, boot in wired(tmp_path, WeakSource(), {}):
         alarm = field.raised("wiring_drive")

@@ -105,6 +105,7 @@ def test_identified_figures_do_not_raise_false_alarms(
     assert alarms <= most
 
 
+@pytest.mark.nightly
 def test_damages_in_sequence_are_found_one_after_the_other(kabe: Structure) -> None:
     both = [
         Damage(3.0, {"springs.k4_46.stiffness": 50.0}),

@@ -117,6 +117,7 @@ def test_a_page_that_cannot_be_written_is_one_plain_line(
     assert "cannot be written" in capsys.readouterr().err
 
 
+@pytest.mark.nightly
 def test_several_records_give_what_each_gives_alone(
     table: Path, session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -177,6 +177,7 @@ def sides(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Sid
         side.close()
 
 
+@pytest.mark.nightly
 def test_whatever_happens_to_rigs_of_a_table_they_get_what_they_get_alone(sides) -> None:
     alone, table = sides
     never = 10**9

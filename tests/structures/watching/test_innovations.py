@@ -105,6 +105,7 @@ def test_a_softer_spring_is_found_all_the_same(
     assert [d.ranking.best.name for d in found.damages] == [spring]
 
 
+@pytest.mark.nightly
 def test_a_structure_that_moves_at_the_first_sample_is_watched_all_the_same(
     file: Path, structure: Structure
 ) -> None:

@@ -102,6 +102,7 @@ def test_the_order_of_terms_makes_no_difference(
     assert found.fitted.train_error == pytest.approx(taught(2).fitted.train_error, rel=0.03)
 
 
+@pytest.mark.nightly
 def test_a_fit_that_begins_blown_up_ends_as_one_that_is_not(
     healthy: Callable[[int], Case], taught: Taught, bare: Taught
 ) -> None:

@@ -66,12 +66,10 @@ def test_nothing_is_missing_where_nothing_is_hidden() -> None:
     assert ranking(found)[1].word == "nothing_missing"
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("case", "named"),
-    [
-        pytest.param("deadband", "dead_band@drive", marks=pytest.mark.nightly),
-        ("coulomb_other_excitation", "coulomb@load"),
-    ],
+    [("deadband", "dead_band@drive"), ("coulomb_other_excitation", "coulomb@load")],
 )
 def test_what_is_hidden_is_named_under_any_excitation(case: str, named: str) -> None:
     _, verdict = ranking(bench(case))

@@ -59,6 +59,7 @@ def bench(case: str) -> Bench:
     return bench_of(told(), data, quiet_scale(data.train))
 
 
+@pytest.mark.nightly
 def test_healthy_fit_comes_near_to_what_repeated_periods_allow() -> None:
     found = bench("none")
 
@@ -93,6 +94,7 @@ def test_what_is_hidden_is_named(
     assert truth is None or value == pytest.approx(truth, rel=0.05)
 
 
+@pytest.mark.nightly
 def test_model_that_does_not_describe_the_healthy_rig_names_nothing() -> None:
     healthy = part(recorded("healthy"), SETTLED)
     other = replace(healthy, outputs=healthy.outputs * [1.0, -1.0])

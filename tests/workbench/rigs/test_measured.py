@@ -22,6 +22,7 @@ def test_a_cubic_spring_is_named_in_silverbox(silverbox: Path, tmp_path: Path) -
     assert (found.ranking[0].effect, found.ranking[0].port) == ("cubic_stiffness", "load")
 
 
+@pytest.mark.nightly
 def test_silverbox_has_a_cubic_spring_and_no_quadratic_one(silverbox: Path, tmp_path: Path) -> None:
     study = create(tmp_path / "s", CONFIGS / "studies" / "silverbox.toml", silverbox)
     refused = add(study, "quadratic_stiffness")
@@ -41,6 +42,7 @@ def test_emps_in_open_loop_beats_the_published_grey_box(emps: Path, tmp_path: Pa
     assert error < 3.98e-3
 
 
+@pytest.mark.nightly
 def test_one_recording_of_the_cylinder_cannot_tell_viscous_from_coulomb(
     cylinder: Path, tmp_path: Path
 ) -> None:

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from rigwatch.workbench.explain.explain import ranking
 from tests.workbench.rigs.slides import MIDDLE, Hidden, bench
 
@@ -31,6 +33,7 @@ def test_the_middle_from_which_a_slide_binds_is_found(tmp_path: Path) -> None:
     assert abs(strength / BINDING - 1) < 0.05
 
 
+@pytest.mark.nightly
 def test_beside_dry_friction_a_pair_finds_the_middle_of_a_spring(tmp_path: Path) -> None:
     _, verdict = ranking(bench(tmp_path, Hidden(cubic=CUBIC, dry=DRY)))
 

@@ -119,7 +119,11 @@ def plain_error(tmp_path_factory: pytest.TempPathFactory) -> float:
     return float(study.compare().found.held_out_error)
 
 
-@pytest.mark.parametrize("kind", [dict, as_pandas, as_polars, as_xarray, as_times])
+@pytest.mark.parametrize(
+    "kind",
+    [dict, as_pandas, as_times]
+    + [pytest.param(kind, marks=pytest.mark.nightly) for kind in (as_polars, as_xarray)],
+)
 def test_a_table_of_any_kind_becomes_the_same_study(
     tmp_path: Path, model: str, plain_error: float, kind: Any
 ) -> None:

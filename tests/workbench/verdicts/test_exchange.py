@@ -40,7 +40,12 @@ def slider_behind(gap: float):
     ("gap", "offered"),
     [
         pytest.param(0.003, "jenkins_behind_gap", id="wide", marks=pytest.mark.nightly),
-        pytest.param(0.0008, "jenkins_behind_gap", id="narrow, for which a drag stands in"),
+        pytest.param(
+            0.0008,
+            "jenkins_behind_gap",
+            id="narrow, for which a drag stands in",
+            marks=pytest.mark.nightly,
+        ),
         pytest.param(0.0, None, id="none"),
     ],
 )

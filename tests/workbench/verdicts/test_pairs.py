@@ -94,6 +94,7 @@ def test_the_two_that_are_hidden_are_the_likeliest_pair(bench, rows):
     assert {first.one.label, first.other.label} == set(PAIR)
 
 
+@pytest.mark.nightly
 def test_both_are_named_and_the_ranking_shows_each_alone(bench, rows):
     alone = judge(bench.base, rows, bench.floor)
     found = two_effects(bench, rows, alone, no_progress)
