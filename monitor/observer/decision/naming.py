@@ -37,6 +37,7 @@ from monitor.observer.decision.window_statistics import (
     friction,
     rest,
     reversals,
+    rings,
     unrecorded_friction,
 )
 from monitor.observer.lateness import is_late
@@ -122,14 +123,12 @@ def _verdict(
         return OTHER
     since = count[ONSET]
     length = min(since + SHORT, LONG)
-    beside, _, _, share, dry = friction(kept, length, spread)
+    _, _, _, share, dry = friction(kept, length, spread)
     force, acting = dry_force(kept, since, length, rules.high_pass)
     out[SHARE, k], out[DRY_SHARE, k] = share, dry
-    known = LEFT_UNSURE if is_late(kept.lateness) else LEFT
-    least = LEFT_EARLY if length < MEDIUM else known
-    fits = share > FITS and dry > DRY_PART and force > 0.0 and beside > least * force
-    drive = drive_explains(kept, length, spread)
-    fits = fits and 1.0 - share < OUTDONE * max(1.0 - drive, NOISE)
+    fits = _fits(kept, length, spread, force, False)
+    if not fits and rings(kept, length, spread):
+        fits = _fits(kept, length, spread, force, True)
     turns = reversals(kept, length, rules.speed_noise)
     still = rest(kept, length, rules.speed_noise)
     sticks = since >= LONG // 2 and still > AT_REST and out[DEPARTED, k] > 0.0
@@ -142,6 +141,24 @@ def _verdict(
     if count[AGREED] >= LOOKS or before in (FRICTION, STICKING):
         return STICKING if still > STUCK or before == STICKING else FRICTION
     return OTHER if since > rules.patience else UNNAMED
+
+
+@part()
+def _fits(kept: DecisionState, length: int, spread: float, force: float, averaged: bool) -> bool:
+    """Whether dry friction explains the residual over a window better than anything else.
+
+    Of the ringing of a sensor, near half the sample rate, means of two neighbours leave little.
+
+    Args:
+        kept, length, spread, averaged: as for `friction`.
+        force: of dry friction alone [N].
+    """
+    beside, _, _, share, dry = friction(kept, length, spread, averaged)
+    known = LEFT_UNSURE if is_late(kept.lateness) else LEFT
+    least = LEFT_EARLY if length < MEDIUM else known
+    fits = share > FITS and dry > DRY_PART and force > 0.0 and beside > least * force
+    drive = drive_explains(kept, length, spread, averaged)
+    return fits and 1.0 - share < OUTDONE * max(1.0 - drive, NOISE)
 
 
 @part()

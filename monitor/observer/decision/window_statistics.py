@@ -44,6 +44,9 @@ BURST = 3.0
 """Largest energy of a sample that counts for a lasting change, relative to the limit."""
 SHORTEST = 4
 """Fewest samples in which the onset of friction is looked for."""
+RINGS = 4.0
+"""Ratio of the energy of half the changes from sample to sample to that of noise, which is half of
+the residual's, from which on a sensor rings."""
 RIDGE = 1e-3
 """Correlation of the viscous and the dry regressor above which they cannot be distinguished."""
 
@@ -110,28 +113,39 @@ def slides_on(kept: DecisionState, ago: int) -> bool:
 
 @part()
 def friction(
-    kept: DecisionState, length: int, spread: float
+    kept: DecisionState, length: int, spread: float, averaged: bool = False
 ) -> tuple[float, float, float, float, float]:
     """Coulomb force, viscous coefficient, the former in standard deviations, and two shares.
 
     The shares are of the residual beyond its healthy variance: explained by both friction terms,
     and contained in the dry term.
+
+    Args:
+        kept: the window's rows.
+        length: of the window [samples].
+        spread: of the healthy residual at this motion.
+        averaged: of each two neighbours the mean counts, see `rings`.
     """
     n = min(length, kept.counts[FILLED])
     used = 0
     a = b = c = p = q = yy = 0.0
     for ago in range(1, n + 1):
-        if not slides_on(kept, ago):
+        if not slides_on(kept, ago) or (averaged and not slides_on(kept, ago + 1)):
             continue
         row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
+        before = kept.rows[(kept.counts[HEAD] - ago - averaged) % HISTORY]
+        dry_now = 0.5 * (row[DRY] + before[DRY])
+        wet_now = 0.5 * (row[WET] + before[WET])
+        error_now = 0.5 * (row[ERROR] + before[ERROR])
         used += 1
-        a += row[DRY] * row[DRY]
-        b += row[DRY] * row[WET]
-        c += row[WET] * row[WET]
-        p += row[DRY] * row[ERROR]
-        q += row[WET] * row[ERROR]
-        yy += row[ERROR] * row[ERROR]
-    force, viscous, left, both, dry = solved(a, b, c, p, q, yy, used * spread * spread)
+        a += dry_now * dry_now
+        b += dry_now * wet_now
+        c += wet_now * wet_now
+        p += dry_now * error_now
+        q += wet_now * error_now
+        yy += error_now * error_now
+    healthy = used * spread * spread * (0.5 if averaged else 1.0)
+    force, viscous, left, both, dry = solved(a, b, c, p, q, yy, healthy)
     return force, viscous, force * np.sqrt(left) / spread, both, dry
 
 
@@ -169,6 +183,27 @@ def onset_evidence(kept: DecisionState, spread: float, unsure: float, jumps: boo
 
 
 @part()
+def rings(kept: DecisionState, length: int, spread: float) -> bool:
+    """Whether the residual changes from sample to sample by far more than a healthy one.
+
+    A sensor on a springy bracket, or one that is a mass on a spring itself, rings after each jump
+    of a force: what friction does when the motion reverses, and a healthy motion hardly.
+
+    Args:
+        kept, length, spread: as for `friction`.
+    """
+    n = min(length, kept.counts[FILLED])
+    used, changing = 0, 0.0
+    for ago in range(1, n + 1):
+        if slides_on(kept, ago) and slides_on(kept, ago + 1):
+            row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
+            before = kept.rows[(kept.counts[HEAD] - ago - 1) % HISTORY]
+            used += 1
+            changing += (0.5 * (row[ERROR] - before[ERROR])) ** 2
+    return bool(changing > RINGS * 0.5 * used * spread * spread)
+
+
+@part()
 def solved(  # noqa: PLR0917 -- sums
     a: float, b: float, c: float, p: float, q: float, yy: float, healthy: float
 ) -> tuple[float, float, float, float, float]:
@@ -200,23 +235,28 @@ def _beyond(energy: float, healthy: float) -> float:
 
 
 @part()
-def drive_explains(kept: DecisionState, length: int, spread: float) -> float:
+def drive_explains(
+    kept: DecisionState, length: int, spread: float, averaged: bool = False
+) -> float:
     """Share of the residual beyond its healthy variance that a weaker drive explains.
 
-    Of the same samples as the shares of `friction`.
+    Of the same samples as the shares of `friction`, same arguments.
     """
     n = min(length, kept.counts[FILLED])
     used = 0
     a = p = yy = 0.0
     for ago in range(1, n + 1):
-        if not slides_on(kept, ago):
+        if not slides_on(kept, ago) or (averaged and not slides_on(kept, ago + 1)):
             continue
         row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
+        before = kept.rows[(kept.counts[HEAD] - ago - averaged) % HISTORY]
+        driven_now = 0.5 * (row[DRIVEN] + before[DRIVEN])
+        error_now = 0.5 * (row[ERROR] + before[ERROR])
         used += 1
-        a += row[DRIVEN] * row[DRIVEN]
-        p += row[DRIVEN] * row[ERROR]
-        yy += row[ERROR] * row[ERROR]
-    return _drive_share(a, p, yy, used * spread * spread)
+        a += driven_now * driven_now
+        p += driven_now * error_now
+        yy += error_now * error_now
+    return _drive_share(a, p, yy, used * spread * spread * (0.5 if averaged else 1.0))
 
 
 @part()
