@@ -38,6 +38,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Attacked]:
         yield made
 
 
+@pytest.mark.nightly
 def test_two_hundred_kinds_of_message_change_nothing(rig: Attacked) -> None:
     payloads = kinds()
     assert len(set(payloads)) > 0.8 * KINDS

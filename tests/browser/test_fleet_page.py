@@ -133,6 +133,7 @@ def test_without_the_token_nobody_sees_the_rigs(page: Page) -> None:
             urllib.request.urlopen(page.served.address + path)
 
 
+@pytest.mark.nightly
 def test_a_page_whose_server_ends_says_that_it_is_old(page: Page) -> None:
     page.served.end()
     page.until(lambda: "not connected since" in page.text("#link"), "the lost connection")

@@ -99,6 +99,7 @@ def exchanged(rig: Field, served: AbstractContextManager[None]) -> Iterator[None
         yield
 
 
+@pytest.mark.nightly
 def test_the_link_alarm_names_the_other_device_and_none_of_its_samples_is_taken(
     tmp_path: Path,
 ) -> None:

@@ -105,6 +105,7 @@ def test_43_a_clock_that_is_set_back(clocked: tuple[Field, Device], tmp_path: Pa
     forward_and_whole(list(open_session(folder).samples()))
 
 
+@pytest.mark.nightly
 def test_63_a_clock_that_is_far_ahead_for_a_while(
     clocked: tuple[Field, Device], tmp_path: Path
 ) -> None:

@@ -85,6 +85,7 @@ def loud(tmp_path: Path) -> Iterator[tuple[Field, int]]:
     yield from wired(tmp_path, AmplifiedSource(), {})
 
 
+@pytest.mark.nightly
 def test_15_a_wiring_that_a_person_accepts_is_watched_also_after_a_kill(
     loud: tuple[Field, int],
 ) -> None:

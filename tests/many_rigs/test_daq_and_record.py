@@ -188,6 +188,7 @@ def test_a_line_that_is_unplugged_delays_none_and_is_found_again(site):
     assert not site.heard["left"].lost
 
 
+@pytest.mark.nightly
 def test_both_processes_are_killed_and_every_sample_is_accounted_for(site):
     recorder = site.start_record()
     for name in WELL:

@@ -126,6 +126,7 @@ def test_a_mistake_in_the_base_is_named_and_all_goes_on(fleet):
     base.write_text(text)
 
 
+@pytest.mark.nightly
 def test_at_its_end_the_sessions_carry_the_whole_configuration(fleet):
     for name in NAMES:
         fleet.go_on(name)

@@ -64,6 +64,7 @@ def test_what_is_learned_holds_under_an_excitation_that_was_not_learned(
     assert ranking(found)[1].word != "missing_effect"
 
 
+@pytest.mark.nightly
 def test_friction_is_named_in_newtons_under_an_excitation_that_was_not_learned(
     tmp_path: Path, taught: tuple[Study, Data, FloatArray | None]
 ) -> None:

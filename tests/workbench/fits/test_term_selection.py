@@ -115,6 +115,7 @@ def test_a_fit_that_begins_blown_up_ends_as_one_that_is_not(
     assert found.train_error < bare(2).fitted.train_error
 
 
+@pytest.mark.nightly
 def test_a_model_with_equilibria_that_nobody_has_seen_does_not_stay(
     healthy: Callable[[int], Case], taught: Taught, bare: Taught
 ) -> None:
