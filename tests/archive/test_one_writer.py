@@ -71,8 +71,14 @@ def killed_at(root: Path, change: int) -> bool:
     return os.WIFSIGNALED(os.waitpid(child, 0)[1])
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize(("next_run", "every"), [("retain", 1), ("index", 1)])
+@pytest.mark.parametrize(
+    ("next_run", "every"),
+    [
+        ("retain", 3),
+        pytest.param("retain", 1, marks=pytest.mark.nightly),
+        pytest.param("index", 1, marks=pytest.mark.nightly),
+    ],
+)
 def test_thinning_killed_at_any_point_loses_nothing(
     root: Path, tmp_path: Path, next_run: str, every: int
 ) -> None:

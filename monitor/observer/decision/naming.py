@@ -123,12 +123,10 @@ def _verdict(
         return OTHER
     since = count[ONSET]
     length = min(since + SHORT, LONG)
-    _, _, _, share, dry = friction(kept, length, spread)
     force, acting = dry_force(kept, since, length, rules.high_pass)
-    out[SHARE, k], out[DRY_SHARE, k] = share, dry
-    fits = _fits(kept, length, spread, force, False)
+    fits, out[SHARE, k], out[DRY_SHARE, k] = _fits(kept, length, spread, force, False)
     if not fits and rings(kept, length, spread):
-        fits = _fits(kept, length, spread, force, True)
+        fits = _fits(kept, length, spread, force, True)[0]
     turns = reversals(kept, length, rules.speed_noise)
     still = rest(kept, length, rules.speed_noise)
     sticks = since >= LONG // 2 and still > AT_REST and out[DEPARTED, k] > 0.0
@@ -144,7 +142,9 @@ def _verdict(
 
 
 @part()
-def _fits(kept: DecisionState, length: int, spread: float, force: float, averaged: bool) -> bool:
+def _fits(
+    kept: DecisionState, length: int, spread: float, force: float, averaged: bool
+) -> tuple[bool, float, float]:
     """Whether dry friction explains the residual over a window better than anything else.
 
     Of the ringing of a sensor, near half the sample rate, means of two neighbours leave little.
@@ -152,13 +152,16 @@ def _fits(kept: DecisionState, length: int, spread: float, force: float, average
     Args:
         kept, length, spread, averaged: as for `friction`.
         force: of dry friction alone [N].
+
+    Returns:
+        That, and the two shares of `friction`.
     """
     beside, _, _, share, dry = friction(kept, length, spread, averaged)
     known = LEFT_UNSURE if is_late(kept.lateness) else LEFT
     least = LEFT_EARLY if length < MEDIUM else known
     fits = share > FITS and dry > DRY_PART and force > 0.0 and beside > least * force
     drive = drive_explains(kept, length, spread, averaged)
-    return fits and 1.0 - share < OUTDONE * max(1.0 - drive, NOISE)
+    return fits and 1.0 - share < OUTDONE * max(1.0 - drive, NOISE), share, dry
 
 
 @part()

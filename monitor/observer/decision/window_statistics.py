@@ -112,6 +112,12 @@ def slides_on(kept: DecisionState, ago: int) -> bool:
 
 
 @part()
+def counts(kept: DecisionState, ago: int, averaged: bool) -> bool:
+    """Whether a sample counts for friction; of a mean of two neighbours, whether both do."""
+    return slides_on(kept, ago) and (not averaged or slides_on(kept, ago + 1))
+
+
+@part()
 def friction(
     kept: DecisionState, length: int, spread: float, averaged: bool = False
 ) -> tuple[float, float, float, float, float]:
@@ -130,7 +136,7 @@ def friction(
     used = 0
     a = b = c = p = q = yy = 0.0
     for ago in range(1, n + 1):
-        if not slides_on(kept, ago) or (averaged and not slides_on(kept, ago + 1)):
+        if not counts(kept, ago, averaged):
             continue
         row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
         before = kept.rows[(kept.counts[HEAD] - ago - averaged) % HISTORY]
@@ -195,7 +201,7 @@ def rings(kept: DecisionState, length: int, spread: float) -> bool:
     n = min(length, kept.counts[FILLED])
     used, changing = 0, 0.0
     for ago in range(1, n + 1):
-        if slides_on(kept, ago) and slides_on(kept, ago + 1):
+        if counts(kept, ago, True):
             row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
             before = kept.rows[(kept.counts[HEAD] - ago - 1) % HISTORY]
             used += 1
@@ -246,7 +252,7 @@ def drive_explains(
     used = 0
     a = p = yy = 0.0
     for ago in range(1, n + 1):
-        if not slides_on(kept, ago) or (averaged and not slides_on(kept, ago + 1)):
+        if not counts(kept, ago, averaged):
             continue
         row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
         before = kept.rows[(kept.counts[HEAD] - ago - averaged) % HISTORY]

@@ -258,7 +258,8 @@ def _is_better(first: Explained, second: Explained) -> bool:
     """Whether the explanation by all effects is to be told in place of that by the usual ones."""
     if _only_training_may_ask(first):
         return _trains_better(first, second.rows[0])
-    return not second.explanation.remains and _halves(first, second)
+    found = second.explanation
+    return not found.remains and (bool(found.beside) or _halves(first, second.rows[0]))
 
 
 def _trains_better(first: Explained, row: Ranked) -> bool:
@@ -276,7 +277,7 @@ def _leaves_less(first: Explained, row: Ranked) -> bool:
     return row.accepted and not (named and row.held_out_error > first.rows[0].held_out_error)
 
 
-def _may_replace(first: Explained, row: Ranked) -> bool:
+def _halves(first: Explained, row: Ranked) -> bool:
     """Whether an effect leaves at most half the error above noise of what was named, if any was."""
     if not row.accepted or first.explanation.verdict not in STRENGTH_TOLD:
         return row.accepted
@@ -284,11 +285,6 @@ def _may_replace(first: Explained, row: Ranked) -> bool:
     if before is None or after is None:
         return False
     return first.bench.floor.left_over(before.held_out, after.held_out) <= HALF**2
-
-
-def _halves(first: Explained, second: Explained) -> bool:
-    """Whether what is named leaves at most half the error above noise of what was named before."""
-    return bool(second.explanation.beside) or _may_replace(first, second.rows[0])
 
 
 def _unless_named(found: Explained, more: str) -> Explained:

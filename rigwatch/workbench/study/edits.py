@@ -22,7 +22,8 @@ _LIST = r"\[(?:#[^\n]*|\"[^\"\n]*\"|'[^'\n]*'|[^\]\"'#])*\][^\n]*\n?"
 """A list of texts, on one line or on several."""
 CHOSEN = "  # chosen from the data"
 """Comment on lines that are written with the first effect and removed with it."""
-_HOLDS = re.compile(rf"(?m)^(hold|late|holds_chosen) = .*{CHOSEN}.*\n")
+_HOLDS = re.compile(r"(?m)^[ \t]*(hold|late|holds_chosen)\b.*\n")
+"""What `holds_chosen` declares to be chosen, whether or not the comment is still there."""
 
 
 def append_effect(study: Study, accepted: Accepted) -> Study:

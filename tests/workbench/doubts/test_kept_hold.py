@@ -15,7 +15,7 @@ from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.fit.input_hold import stepped, with_hold
 from rigwatch.workbench.ranking import rank
 from rigwatch.workbench.steps.trial import try_add
-from rigwatch.workbench.study.edits import drop_effect
+from rigwatch.workbench.study.edits import drop_effect, keep_holds
 from rigwatch.workbench.study.study import Study
 from rigwatch.workbench.study.study_file import Span, StudyFile
 from tests.workbench.machine import studied
@@ -85,6 +85,9 @@ def test_a_hold_that_an_earlier_step_chose_is_chosen_again(
     rows = rank(bench.study, bench.data, bench.base, bench.floor)
     found = with_hold_decided(bench, rows)
     assert found.bench.study.holds["power"].late == pytest.approx(late, abs=0.05)
+    kept = keep_holds(found.bench.study).file
+    assert kept.late.get("power", 0.0) == pytest.approx(late, abs=0.05)
+    assert kept.holds_chosen == bool(keys)
 
 
 def in_memory(steady: int, noise: float = 0.0, **more: float) -> tuple[Study, Data]:

@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -86,13 +87,26 @@ def logged(
     return f"{path}"
 
 
+def begun(folder: Path, logs: list[str]) -> Path:
+    """The folder of a study of these logs of a damper."""
+    model, made = folder / "damper.toml", folder / "study"
+    model.write_text(WITH_OIL)
+    assert main(["study", "new", f"{made}", "--data", *logs, "--model", f"{model}"]) == 0
+    return made
+
+
+def explained(folder: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+    """What `rigwatch explain --json` prints of a study."""
+    capsys.readouterr()
+    assert main(["explain", f"{folder}", "--json"]) == 0
+    return dict(json.loads(capsys.readouterr().out))
+
+
 def test_rarer_effects_are_counted_apart_and_offered_where_none_explains_the_error(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "damper.toml").write_text(WITH_OIL)
     logs = [logged(tmp_path / f"run{seed}.csv", seed) for seed in (1, 2)]
-    folder, model = tmp_path / "study", tmp_path / "damper.toml"
-    assert main(["study", "new", f"{folder}", "--data", *logs, "--model", f"{model}"]) == 0
+    folder = begun(tmp_path, logs)
     tried, rarer = suitable(open_study(folder))
     assert {"coulomb", "jenkins"} <= set(tried)
     assert {"maxwell_slip", "jenkins_behind_gap"} <= set(rarer)
@@ -130,10 +144,8 @@ def test_rarer_effects_are_counted_apart_and_offered_where_none_explains_the_err
 def test_a_rarer_effect_is_named_in_a_second_pass(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], law: Law, name: str
 ) -> None:
-    (tmp_path / "damper.toml").write_text(WITH_OIL)
     logs = [logged(tmp_path / f"run{seed}.csv", seed, law) for seed in (1, 2)]
-    folder, model = tmp_path / "study", tmp_path / "damper.toml"
-    assert main(["study", "new", f"{folder}", "--data", *logs, "--model", f"{model}"]) == 0
+    folder = begun(tmp_path, logs)
     rarer = len(suitable(open_study(folder))[1])
     assert main(["explain", f"{folder}"]) == 0
     out = capsys.readouterr().out
@@ -146,13 +158,8 @@ def test_a_rarer_effect_is_named_in_a_second_pass(
 def test_a_rarer_effect_beside_a_usual_one_is_named_with_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "damper.toml").write_text(WITH_OIL)
     logs = [logged(tmp_path / f"run{seed}.csv", seed, stop_and_drag) for seed in (1, 2)]
-    folder, model = tmp_path / "study", tmp_path / "damper.toml"
-    assert main(["study", "new", f"{folder}", "--data", *logs, "--model", f"{model}"]) == 0
-    capsys.readouterr()
-    assert main(["explain", f"{folder}", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = explained(begun(tmp_path, logs), capsys)
     assert found["verdict"] == "missing_effect"
     assert {"stop_below@load", "quadratic_drag@load"} <= set(re.findall(r"\w+@load", found["text"]))
     assert found["remains"] == 0.0
@@ -161,13 +168,8 @@ def test_a_rarer_effect_beside_a_usual_one_is_named_with_it(
 def test_a_stop_that_is_rarely_reached_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "damper.toml").write_text(WITH_OIL)
     logs = [logged(tmp_path / f"run{seed}.csv", seed, far_stop_below, burst=2.5) for seed in (1, 6)]
-    folder, model = tmp_path / "study", tmp_path / "damper.toml"
-    assert main(["study", "new", f"{folder}", "--data", *logs, "--model", f"{model}"]) == 0
-    capsys.readouterr()
-    assert main(["explain", f"{folder}", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = explained(begun(tmp_path, logs), capsys)
     best = found["ranking"][0]
     assert found["verdict"] == "missing_effect"
     assert best["effect"] == "stop_below"
@@ -187,16 +189,11 @@ def test_a_stop_that_is_rarely_reached_is_named(
 def test_an_effect_that_only_the_training_reaches_is_undetermined(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], law: Law, word: str, told: str
 ) -> None:
-    (tmp_path / "damper.toml").write_text(WITH_OIL)
     logs = [
         logged(tmp_path / f"run{seed}.csv", seed, law, stroke)
         for seed, stroke in ((1, 0.01), (2, 0.005))
     ]
-    folder, model = tmp_path / "study", tmp_path / "damper.toml"
-    assert main(["study", "new", f"{folder}", "--data", *logs, "--model", f"{model}"]) == 0
-    capsys.readouterr()
-    assert main(["explain", f"{folder}", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = explained(begun(tmp_path, logs), capsys)
     assert found["verdict"] == word
     assert told in found["text"]
     if word == "undetermined":
@@ -220,13 +217,8 @@ def test_an_effect_that_only_the_training_reaches_is_undetermined(
 def test_a_rarer_effect_like_those_named_is_a_rival_if_it_leaves_less_or_is_simpler(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], law: Law, rival: str, told: str
 ) -> None:
-    (tmp_path / "damper.toml").write_text(WITH_OIL)
     logs = [logged(tmp_path / f"run{seed}.csv", seed, law) for seed in (1, 2)]
-    folder, model = tmp_path / "study", tmp_path / "damper.toml"
-    assert main(["study", "new", f"{folder}", "--data", *logs, "--model", f"{model}"]) == 0
-    capsys.readouterr()
-    assert main(["explain", f"{folder}", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = explained(begun(tmp_path, logs), capsys)
     assert found["verdict"] == "undetermined"
     assert found["rivals"] == [rival]
     assert re.search(f"{rival} leaves {told}", found["text"])

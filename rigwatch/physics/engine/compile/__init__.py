@@ -12,6 +12,7 @@ from rigwatch.physics.engine.compile.compiled_system import (
     Linearisation,
     Simulation,
     compile_system,
+    elapsed,
 )
 from rigwatch.physics.engine.compile.derivatives import derivative
 from rigwatch.physics.engine.compile.integrator import across, call, input_rows, place
@@ -31,6 +32,7 @@ __all__ = [
     "compile_system",
     "cores",
     "derivative",
+    "elapsed",
     "evaluated",
     "even_substeps",
     "input_rows",

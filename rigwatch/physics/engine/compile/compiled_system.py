@@ -54,6 +54,7 @@ class Linearisation:
         outputs: at the samples, shape (windows, samples, outputs).
         update_slopes: at the samples, shape (windows, samples, n, m + n + q): derivatives of the
             states after an update by those before; shape (windows, 0, …) without sampled states.
+        time: of the equations at the sample before each node, shape (windows, nodes) [s].
     """
 
     spacing: FloatArray
@@ -63,6 +64,7 @@ class Linearisation:
     read_slopes: FloatArray
     outputs: FloatArray
     update_slopes: FloatArray
+    time: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,8 +192,8 @@ class CompiledSystem:
         updates = np.zeros((len(starts), count, n, wide))
         self.kernel.linearise(*arguments, states, rates, outputs, reads, updates)
         rows = starts[:, None] + np.arange(nodes[1]) // substeps
-        spacing = arguments[1][rows] / substeps
-        return Linearisation(spacing, substeps, states, rates, reads, outputs, updates)
+        spacing, time = arguments[1][rows] / substeps, arguments[3][rows]
+        return Linearisation(spacing, substeps, states, rates, reads, outputs, updates, time)
 
     def _arguments(  # noqa: PLR0917 -- they stand in the order of the kernel's
         self,
@@ -231,7 +233,7 @@ class CompiledSystem:
         if begins is None:
             begins = np.zeros(len(inputs), np.int64)
         if time is None:
-            time = (np.arange(len(inputs)) - begins) * spacing
+            time = elapsed(begins, spacing)
         return (driven, spacing, begins, time, substeps, hold, starts, first, values)
 
     def vector(self, values: Mapping[str, float]) -> FloatArray:
@@ -250,6 +252,16 @@ class CompiledSystem:
                 )
             vector[names.index(name)] = value
         return vector
+
+
+def elapsed(begins: IntArray, spacing: FloatArray) -> FloatArray:
+    """Time since the first sample of its recording at each sample, shape (n,) [s].
+
+    Args:
+        begins: that first sample, by sample, shape (n,).
+        spacing: time from each sample to the next, shape (n,) [s].
+    """
+    return np.asarray((np.arange(len(begins)) - begins) * spacing, np.float64)
 
 
 def compile_system(system: System) -> CompiledSystem:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
+from rigwatch.physics.engine.compile import elapsed
 from rigwatch.physics.engine.equations import Model, System
 from rigwatch.physics.engine.fit.decimation import Thinning
 from rigwatch.physics.transfer import Derivative
@@ -97,8 +98,8 @@ class Recording:
     @property
     def time(self) -> FloatArray:
         """Time of the equations at each sample, shape (n,) [s]."""
-        since = (np.arange(len(self)) - self.begins) * self.spacing
-        return np.repeat(self.times_begun, self.parts or (len(self),)) + since
+        begun = np.repeat(self.times_begun, self.parts or (len(self),))
+        return begun + elapsed(self.begins, self.spacing)
 
     def stretch(self, begin: int, end: int) -> "Recording":
         """The samples from `begin` to before `end`; their residuals are not thinned."""

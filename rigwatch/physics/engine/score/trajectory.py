@@ -86,9 +86,8 @@ def trajectory(
         else:
             behind = np.ceil(after - place).astype(np.int64)
             at_nodes[..., column] = signal[np.maximum(rows - behind, oldest)]
-    since = (rows - oldest) * spacing if time is None else time[rows]
     apart = () if begins is None else _apart(begins[starts])
-    return Trajectory(compiled, run, at_nodes, since + place * spacing, parameters, apart)
+    return Trajectory(compiled, run, at_nodes, run.time + place * spacing, parameters, apart)
 
 
 def _apart(begun: IntArray) -> tuple[slice, ...]:

@@ -57,8 +57,12 @@ class _PortSignals:
     def sizes(self, name: str) -> Sizes:
         """Root mean squares at a port."""
         port = self._model.ports[name]
-        variables = {n: self._variable(n, v.expression) for n, v in port.variables.items()}
-        if "v" in variables and ("x" not in variables or self._is_unknown(port, "x")):
+        shown = {n: self._shown_by_channels(v.expression) for n, v in port.variables.items()}
+        variables = {
+            n: self._inferred(n, port.variables[n].expression) if signal is None else signal
+            for n, signal in shown.items()
+        }
+        if "v" in variables and shown.get("x") is None:
             variables["x"] = _travel(variables["v"], self._recording)
         signal = self._signal(port, self._measured) if port.signal else None
         return sizes_at_port(variables, signal, self._recording.dt)
@@ -81,24 +85,19 @@ class _PortSignals:
             arriving(self._model, port), signals, self._values, f"port signal {port.signal}"
         )
 
-    def _variable(self, name: str, text: str) -> FloatArray:
-        """One variable of a port, shape (n,)."""
-        shown = self._shown.of(text, VARIABLE) if self._names_hidden(text) else None
-        if shown is not None:
-            return shown
+    def _shown_by_channels(self, text: str) -> FloatArray | None:
+        """A variable as channels show it, shape (n,); None of one such as the twist of a shaft."""
+        if names_reached(self._model, text, VARIABLE) & self._hidden:
+            return self._shown.of(text, VARIABLE)
+        return evaluated(text, self._measured, self._values, VARIABLE)
+
+    def _inferred(self, name: str, text: str) -> FloatArray:
+        """A variable that no channel shows, from initial states or from a run, shape (n,)."""
         found = evaluated(text, self._measured, self._values, VARIABLE)
         # A motion that nobody measures stays at its initial value, which is no size if it is zero.
-        if name in MOTION and self._names_hidden(text) and not np.any(found):
+        if name in MOTION and not np.any(found):
             return evaluated(text, self._simulated, self._values, VARIABLE)
         return found
-
-    def _names_hidden(self, text: str) -> bool:
-        return bool(names_reached(self._model, text, VARIABLE) & self._hidden)
-
-    def _is_unknown(self, port: Port, variable: str) -> bool:
-        """Whether a variable is one that no channel shows, such as the twist of a shaft."""
-        text = port.variables[variable].expression
-        return self._names_hidden(text) and self._shown.of(text, VARIABLE) is None
 
     @cached_property
     def _simulated(self) -> dict[str, FloatArray]:

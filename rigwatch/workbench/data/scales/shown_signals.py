@@ -4,6 +4,7 @@ The travel of a strut is a difference of two positions: a channel measures it, b
 """
 
 from collections.abc import Mapping
+from functools import cached_property
 
 import numpy as np
 import sympy
@@ -44,15 +45,21 @@ class ShownSignals:
             where: what it defines, for errors.
         """
         wanted = parse(text, self._names, where)
-        for column, name in enumerate(self._system.model.outputs):
-            output = self._system.outputs[name].xreplace(self._still)
+        for read, (output, rate) in zip(self._recording.outputs.T, self._expressions, strict=True):
             share = _ratio(wanted, output)
             if share is not None:
-                return share * self._recording.outputs[:, column]
-            share = _ratio(wanted, self._rate(output))
+                return np.asarray(share * read, np.float64)
+            share = _ratio(wanted, rate)
             if share is not None:
-                return share * self._rate_of_channel(column)
+                return share * self._rate_of_channel(read)
         return None
+
+    @cached_property
+    def _expressions(self) -> list[tuple[sympy.Expr, sympy.Expr]]:
+        """What each channel shows, and its rate of change."""
+        names = self._system.model.outputs
+        shown = [self._system.outputs[name].xreplace(self._still) for name in names]
+        return [(output, self._rate(output)) for output in shown]
 
     def _rate(self, expression: sympy.Expr) -> sympy.Expr:
         """Rate of change of an expression in the states."""
@@ -60,12 +67,9 @@ class ShownSignals:
         terms = (derivative(expression, symbol(n)) * self._system.derivatives[n] for n in moved)
         return sympy.Add(*terms).xreplace(self._still)
 
-    def _rate_of_channel(self, column: int) -> FloatArray:
-        read, rates = self._recording.outputs[:, column], []
+    def _rate_of_channel(self, read: FloatArray) -> FloatArray:
         parts = zip(self._recording.slices, self._recording.own_spacings, strict=True)
-        for part, dt in parts:
-            rates.append(rate_of_change(read[part], SMOOTHED, dt))
-        return np.concatenate(rates)
+        return np.concatenate([rate_of_change(read[part], SMOOTHED, dt) for part, dt in parts])
 
 
 def _ratio(one: sympy.Expr, other: sympy.Expr) -> float | None:
