@@ -272,6 +272,7 @@ def record(
     disks: DiskTurns | None = None,
     feed_of: FeedOf = Feed,
     flush: float = FLUSH,
+    begins: contextlib.AbstractContextManager[object] | None = None,
 ) -> Path:
     """Record until `stop` is set, telling `pulse` of each turn; returns the session's folder.
 
@@ -282,6 +283,7 @@ def record(
         disks: those of the process, if it records several rigs.
         feed_of: see `Recorder`.
         flush: time until what was received is on the disk, if the configuration says nothing [s].
+        begins: entered while the recording begins, if there are others.
 
     Raises:
         SessionError: another process records this rig into the same folder.
@@ -291,7 +293,8 @@ def record(
     try:
         # Others wait for their turns: what rings have is taken as their answers come.
         catch_up = CATCH_UP if disks is None else 0.0
-        recorder = Recorder(config, run, bus, catch_up, feed_of=feed_of)
+        with begins or contextlib.nullcontext():
+            recorder = Recorder(config, run, bus, catch_up, feed_of=feed_of)
         pulse.ready(f"recording to {recorder.store.folder}")
         turn = _Turn(recorder, kept, bus, pulse)
         every = (recorder.settings.flush or flush) * _OF_FLUSH

@@ -5,6 +5,8 @@ other, and a disk that hangs delays those of no other disk.
 """
 
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -40,6 +42,42 @@ FLUSH_OF_MANY = 0.9
 
 Most of their cost is each rig's turns, of which there are then about half as many.
 """
+BEGIN_TOGETHER = 4
+"""Recordings that begin at the same time."""
+BEGIN_PATIENCE = 10.0
+"""Longest wait for one of those that begin to have begun [s]."""
+
+
+class Begins:
+    """Lets few recordings begin at a time, so that the first ones record while others wait.
+
+    Hundreds that begin at once all ask the rings for what they have; none of them records before
+    nearly all have begun, and what they miss meanwhile is still more to ask for. Recordings that do
+    not get on, because their disk or their router hangs, do not hold the others up for long.
+    """
+
+    def __init__(self) -> None:
+        self._free, self._begun = threading.Semaphore(BEGIN_TOGETHER), 0
+
+    @contextmanager
+    def one(self) -> Iterator[None]:
+        """While a recording begins."""
+        is_mine = self._may_begin()
+        try:
+            yield
+        finally:
+            self._begun += 1
+            if is_mine:
+                self._free.release()
+
+    def _may_begin(self) -> bool:
+        """Wait for its turn; false where the others do not get on."""
+        before = -1
+        while not self._free.acquire(timeout=BEGIN_PATIENCE):
+            if self._begun == before:
+                return False
+            before = self._begun
+        return True
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +89,7 @@ class _Process:
         links: to routers.
         disks: their turns.
         flush: time until what was received is on the disk, if a configuration says nothing [s].
+        begins: which may begin.
         folders: of the last session of each, written at its end.
     """
 
@@ -58,6 +97,7 @@ class _Process:
     links: SharedLinks
     disks: DiskTurns
     flush: float
+    begins: Begins = field(default_factory=Begins)
     folders: dict[Path, Path] = field(default_factory=dict)
 
 
@@ -78,6 +118,7 @@ def work_of(path: Path, feed_of: FeedOf, process: _Process) -> Work:
                     disks=process.disks,
                     feed_of=feed_of,
                     flush=process.flush,
+                    begins=process.begins.one(),
                 )
 
     return work

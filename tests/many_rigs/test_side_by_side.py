@@ -89,6 +89,30 @@ def test_one_that_fails_starts_anew_and_keeps_its_count(running, monkeypatch):
     assert running.said == ["b: the device is gone; starts anew in 0 s"]
 
 
+def test_a_process_is_not_ready_while_its_rigs_begin_one_after_the_other(running, monkeypatch):
+    monkeypatch.setattr(side_by_side, "START_PATIENCE", 0.5)
+    ready_at: list[float] = []
+    monkeypatch.setattr(Heartbeat, "ready", lambda *_: ready_at.append(time.monotonic()))
+
+    def begins_after(pause: float) -> Callable[[threading.Event, RigPulse], None]:
+        return lambda stop, pulse: time.sleep(pause) or counting(stop, pulse)
+
+    began = time.monotonic()
+    running.start(a=begins_after(0.3), b=begins_after(0.6), c=begins_after(0.9))
+    eventually(lambda: ready_at != [], "the process is ready")
+    assert ready_at[0] - began >= 0.9
+
+
+def test_a_process_is_ready_beside_a_rig_that_never_begins(running, monkeypatch):
+    monkeypatch.setattr(side_by_side, "START_PATIENCE", 0.2)
+    ready = threading.Event()
+    monkeypatch.setattr(Heartbeat, "ready", lambda *_: ready.set())
+    held = threading.Event()
+    running.start(a=counting, b=lambda _stop, _pulse: held.wait() and None)
+    assert ready.wait(10.0)
+    held.set()
+
+
 def test_the_process_ends_beside_a_rig_that_never_ends(running, monkeypatch):
     monkeypatch.setattr(side_by_side, "STOP_PATIENCE", 0.05)
     held = threading.Event()

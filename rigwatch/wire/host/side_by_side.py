@@ -24,7 +24,7 @@ HANGS_AFTER = 5.0
 FIRST_PAUSE, LONGEST_PAUSE = 1.0, 30.0
 """Pauses before a rig that failed starts anew [s]."""
 START_PATIENCE = 10.0
-"""Longest wait for all rigs before the process counts as ready [s]."""
+"""Longest wait for a further rig to begin before the process counts as ready [s]."""
 STOP_PATIENCE = 5.0
 """Longest wait for a further one of the rigs' loops to end [s]."""
 LONGEST_STOP = 40.0
@@ -171,9 +171,13 @@ def run_side_by_side(
         stop: ends the loop.
         renew: when set, rigs whose configuration has changed start anew; it is cleared.
     """
-    ready, patient_until = False, time.monotonic() + START_PATIENCE
+    ready, settled, settled_at = False, 0, time.monotonic()
     while not stop.wait(BEAT):
-        if not ready and (all(p.settled for p in parts) or time.monotonic() > patient_until):
+        before, settled = settled, sum(part.settled for part in parts)
+        if settled > before:
+            settled_at = time.monotonic()
+        waited = time.monotonic() - settled_at
+        if not ready and (settled == len(parts) or waited > START_PATIENCE):
             ready = True
             heartbeat.ready(f"{len(parts)} rigs")
         if renew.is_set():
