@@ -6,6 +6,7 @@ from rigwatch.workbench.compare.compare import Comparison, compare, comparison
 from rigwatch.workbench.compare.decided_hold import (
     Decided,
     with_hold_decided,
+    with_hold_of,
 )
 from rigwatch.workbench.compare.horizon import with_horizon_of
 from rigwatch.workbench.compare.location import (
@@ -63,5 +64,6 @@ __all__ = [
     "unweighed",
     "with_base",
     "with_hold_decided",
+    "with_hold_of",
     "with_horizon_of",
 ]

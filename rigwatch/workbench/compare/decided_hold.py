@@ -69,7 +69,7 @@ def with_hold_decided(
         return as_found
     left = bench.base if best is None or best.fitted is None else best.fitted
     if explains_more(fitted, left):
-        return _ranked_with(bench, slow, study, progress) or as_found
+        return _ranked_with(_bench_of(bench, study), slow, progress) or as_found
     if best is None or best.effect == SLOW or explains_more(left, fitted):
         return as_found
     return replace(as_found, rival=slow, text=_text(bench.study, best.label, slow, study))
@@ -92,14 +92,42 @@ def _slow_at_ports(bench: Bench) -> Iterator[Placement]:
             yield Placement(SLOW, study.effect_at(SLOW, port).scaled(sizes[port]), port)
 
 
-def _ranked_with(bench: Bench, slow: str, study: Study, progress: Progress) -> Decided | None:
-    """The ranking with the hold that belongs to what is slow; None if that cannot be fitted."""
-    data = bench.data
-    scale = quiet_scale(data.train) if data.train.outputs.shape[1] > 1 else None
+def with_hold_of(bench: Bench, placement: Placement) -> Bench | None:
+    """The study with the hold that its recordings show with an effect in the model.
+
+    None if its hold is not in doubt, or if both together leave no less than the study's hold alone.
+
+    Args:
+        bench: the study with a hold chosen without the effect.
+        placement: the effect.
+    """
+    if not may_hide_slow(bench.study, bench.data):
+        return None
     try:
-        decided = bench_of(study, data, scale)
+        _, study, fitted = with_hold_beside(bench.study, bench.data, bench.base, [placement])
     except ModelError:
         return None
+    if study.holds == bench.study.holds or not explains_more(fitted, bench.base):
+        return None
+    return _bench_of(bench, study)
+
+
+def _bench_of(bench: Bench, study: Study) -> Bench | None:
+    """The bench with the hold of another instance of its study; None if that cannot be fitted."""
+    train = bench.data.train
+    try:
+        return bench_of(
+            study, bench.data, quiet_scale(train) if train.outputs.shape[1] > 1 else None
+        )
+    except ModelError:
+        return None
+
+
+def _ranked_with(decided: Bench | None, slow: str, progress: Progress) -> Decided | None:
+    """The ranking with the hold that belongs to what is slow; None without its bench."""
+    if decided is None:
+        return None
+    study, data = decided.study, decided.data
     rows = rank(study, data, decided.base, decided.floor, progress)
     for row in rows:
         if row.label == slow and row.fitted is None and not row.failure:

@@ -17,7 +17,13 @@ from msgspec import structs
 from rigwatch.physics.engine.equations import Placement
 from rigwatch.physics.engine.score import suits
 from rigwatch.wire.errors import ModelError, nearest
-from rigwatch.workbench.compare import Bench, Comparison, Warm, fitted_beside_healthy
+from rigwatch.workbench.compare import (
+    Bench,
+    Comparison,
+    Warm,
+    fitted_beside_healthy,
+    with_hold_of,
+)
 from rigwatch.workbench.explain import SetGain, set_gain
 from rigwatch.workbench.fit import error_text, fit_model
 from rigwatch.workbench.ranking import (
@@ -126,8 +132,8 @@ def try_add(
     effect, where = _placed(study, effect, port)
     others = _others(study, f"{effect}@{where}", beside)
     progress("fitting the current model")
-    bench, before = warm.bench(study), warm.comparison(study)
-    row = try_effect(study, effect, where, progress, warm)
+    before = warm.comparison(study)
+    bench, row = _tried_with_hold(study, effect, where, progress, warm)
     assert row.fitted is not None
     found = row.fitted.held_out_error
     in_set = _in_set(bench, row, others, progress)
@@ -293,10 +299,29 @@ def try_effect(
     Raises:
         ModelError: effect or port is unknown or already there, or the fit fails.
     """
-    warm = warm or Warm()
-    where, bench = _port(study, effect, port), warm.bench(study)
-    progress(f"fitting {effect}@{where}")
-    return warm.get((effect, where, stands_on(study)), lambda: _tried(bench, effect, where))
+    where = _port(study, effect, port)
+    return _tried_with_hold(study, effect, where, progress, warm or Warm())[1]
+
+
+def _tried_with_hold(
+    study: Study, effect: str, port: str, progress: Progress, warm: Warm
+) -> tuple[Bench, Ranked]:
+    """The effect as judged, and the bench that it is judged on.
+
+    A hold chosen without the effect may stand for all of it. So where the effect is refused beside
+    that hold, it is judged beside the one that the recordings show with the effect in the model.
+    """
+    bench = warm.bench(study)
+    progress(f"fitting {effect}@{port}")
+
+    def tried() -> tuple[Bench, Ranked]:
+        row = _tried(bench, effect, port)
+        other = None if row.accepted else with_hold_of(bench, row.placement)
+        if other is None or not (again := _tried(other, effect, port)).accepted:
+            return bench, row
+        return other, again
+
+    return warm.get((effect, port, stands_on(study)), tried)
 
 
 def accepted_with_model(row: Ranked) -> Accepted:

@@ -90,6 +90,21 @@ def test_a_hold_that_an_earlier_step_chose_is_chosen_again(
     assert kept.holds_chosen == bool(keys)
 
 
+def test_an_effect_that_the_chosen_hold_stands_for_is_added_with_its_own_hold(
+    tmp_path: Path,
+) -> None:
+    keys = 'hold = { power = "zero" }\nlate = { power = 0.95 }\nholds_chosen = true\n'
+    logs = [[run(seed, 6, slow_s=1.0)] for seed in (1, 2)]
+    made = studied(tmp_path, BLOCK, *logs, {"power": "W", "warmer": "K"}, keys, rates=[1.0, 1.0])
+    trial = try_add(made, "lag", "meter")
+    assert trial.change.step == "add"
+    assert (trial.after.file.hold, trial.after.file.late) == ({"power": "zero"}, {})
+    assert trial.change.after.held_out_error < 0.1 * trial.change.before.held_out_error
+    assert trial.after.file.holds_chosen
+    (added,) = trial.after.file.effects
+    assert added.parameters["tau"] == pytest.approx(1.0, rel=0.1)
+
+
 def in_memory(steady: int, noise: float = 0.0, **more: float) -> tuple[Study, Data]:
     def recording(seed: int) -> Recording:
         table, draw = run(seed, steady, **more), np.random.default_rng(seed + 100)
