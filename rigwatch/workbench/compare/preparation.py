@@ -114,7 +114,7 @@ def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench
     base = fit_base(study, data, scale)
     healthy = data.of_healthy
     if healthy is None:
-        floor, bare = held_out_floor(study, data, base.held_out), None
+        floor, bare = held_out_floor(study, data, base.train, base.held_out), None
     else:
         bare = fit_model(study, healthy, (), study.file.start, base.train.scale, multi_start=True)
         floor = _of_healthy(study, data, healthy, base, bare)
@@ -150,7 +150,7 @@ def with_base(bench: Bench, base: Fitted) -> Bench:
         return bench
     floor = bench.floor
     if bench.data.of_healthy is None:
-        floor = held_out_floor(bench.study, bench.data, base.held_out)
+        floor = held_out_floor(bench.study, bench.data, base.train, base.held_out)
     return replace(bench, base=base, floor=floor)
 
 

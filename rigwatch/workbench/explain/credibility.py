@@ -67,7 +67,7 @@ def unless_resampled(bench: Bench, verdict: Verdict) -> Verdict:
     held = any(model.held(name) == "zero" for name in model.inputs)
     if best is None or best.fitted is None or not (named_alone and held):
         return verdict
-    left = bench.floor.left_over(bench.base.train, best.fitted.train)
+    left = bench.floor.of_training.left_over(bench.base.train, best.fitted.train)
     if RESAMPLED not in bench.data.altered or left <= 1 - LITTLE:
         return verdict
     return replace(verdict, word="undetermined", text=f"{verdict.text}; {RESAMPLED_HELD}")

@@ -27,6 +27,7 @@ from rigwatch.workbench.explain.adequacy import (
     with_base_offered,
     with_change_told,
     with_failure_told,
+    with_reversed_port,
     with_unjudged_told,
 )
 from rigwatch.workbench.explain.changed_parameters import undetermined_if_parameters_changed
@@ -448,7 +449,7 @@ def _judged(bench: Bench, rows: list[Ranked], progress: Progress) -> tuple[list[
         verdict = with_like_ports(bench, rows, verdict, progress)
     rows, verdict = with_rarer_rivals(bench, rows, verdict, progress)
     verdict = unless_refused(refused, with_motion_sensor(bench, verdict))
-    verdict = unless_resampled(bench, verdict)
+    verdict = with_reversed_port(bench, rows, unless_resampled(bench, verdict))
     if along and bench.study.model.rough:
         verdict = limited_verdict(bench.base, rows, bench.floor, verdict)
     elif along:

@@ -38,7 +38,7 @@ def explains_little(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
     if left_over(base, row, floor, tolerant=True) > 1 - LITTLE:
         return True
     assert row.fitted is not None
-    train = floor.left_over(base.train, row.fitted.train)
+    train = floor.of_training.left_over(base.train, row.fitted.train)
     left = min(left_over(base, row, floor), train)
     return bool(base.placements) and left > 1 - LITTLE_BESIDE
 
@@ -50,7 +50,7 @@ def hardly_trains(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
     may lower it by that much by accident.
     """
     assert row.fitted is not None
-    after = row.fitted.train
+    after, floor = row.fitted.train, floor.of_training
     if not floor.lower_limit or floor.reached(after):
         return False
     return floor.left_over(base.train, after) > 1 - LITTLE_IN_TRAINING
@@ -82,7 +82,7 @@ def remaining_error(base: Fitted, row: Ranked, floor: NoiseFloor) -> str:
     train = _remaining_in_training(base, row, floor)
     share, of, fitted = held_out, "error", row.fitted.held_out
     if train > held_out:
-        share, of, fitted = train, "training error", row.fitted.train
+        share, of, fitted, floor = train, "training error", row.fitted.train, floor.of_training
     times = floor.times(fitted)
     if share:
         return f"; {share:.0%} of the {of}'s energy remains, {times:.2g} times the noise floor"
@@ -98,8 +98,9 @@ def _remaining_held_out(base: Fitted, row: Ranked, floor: NoiseFloor) -> float:
 
 
 def _remaining_in_training(base: Fitted, row: Ranked, floor: NoiseFloor) -> float:
-    """The same of the training; its noise is taken to be that of the held-out recordings."""
+    """The same of the training."""
     assert row.fitted is not None
+    floor = floor.of_training
     if floor.method == "healthy motion" or floor.reached(row.fitted.train):
         return 0.0
     share = floor.left_over(base.train, row.fitted.train)

@@ -159,7 +159,7 @@ def own_floor(study: Study, data: Data, floor: NoiseFloor, row: Ranked) -> Noise
     A floor from a healthy recording or from repeated periods stays.
     """
     assert row.fitted is not None
-    return lowered(floor, study, data, row.fitted.held_out)
+    return lowered(floor, study, data, row.fitted.train, row.fitted.held_out)
 
 
 def _is_unlike(row: Ranked, other: Ranked) -> bool:

@@ -64,12 +64,20 @@ class NoiseFloor:
         chance: largest ratio of error to floor that a short recording reaches with noise alone.
         own_error: the error that the model's healthy error lets expect along this motion, by
             frequency; None if that is not known.
+        train_rms: the same as `rms` of the training, where its recordings have more noise than
+            those held out; None if that is not known.
     """
 
     rms: FloatArray
     method: str
     chance: float = 1.0
     own_error: ErrorSpectrum | None = None
+    train_rms: FloatArray | None = None
+
+    @property
+    def of_training(self) -> "NoiseFloor":
+        """That of the training."""
+        return self if self.train_rms is None else replace(self, rms=self.train_rms, train_rms=None)
 
     @property
     def lower_limit(self) -> bool:
@@ -194,11 +202,19 @@ def repeats_at_once(study: Study) -> bool:
     return not study.model.states and bool(study.file.effects)
 
 
-def held_out_floor(study: Study, data: Data, fitted: Fit) -> NoiseFloor:
-    """The floor of a study's held-out recordings from the residual of a fit to them."""
-    found = from_residual(
-        fitted, data.held_out, study.file.period, data.horizon, at_once=repeats_at_once(study)
-    )
+def held_out_floor(study: Study, data: Data, train: Fit, held_out: Fit) -> NoiseFloor:
+    """The floor of a study's held-out recordings, and of its training, from a fit's residuals.
+
+    Args:
+        study, data: the study.
+        train, held_out: the fit, and its parameters on the recordings held out.
+    """
+    period, at_once = study.file.period, repeats_at_once(study)
+    found = from_residual(held_out, data.held_out, period, data.horizon, at_once=at_once)
+    if found.method == "quiet band":
+        own = from_residual(train, data.train, period, data.horizon)
+        if own.method == found.method:
+            found = replace(found, train_rms=np.maximum(found.rms, own.rms))
     # Along the measured motion, its noise is in the residual as well.
     if data.along_motion or not found.lower_limit:
         return found
@@ -212,19 +228,21 @@ def _with_stated(floor: NoiseFloor, stated: FloatArray) -> NoiseFloor:
     return NoiseFloor(stated, "stated")
 
 
-def lowered(floor: NoiseFloor, study: Study, data: Data, fitted: Fit) -> NoiseFloor:
+def lowered(floor: NoiseFloor, study: Study, data: Data, train: Fit, held_out: Fit) -> NoiseFloor:
     """The floor, or that of another fit's quietest band in the channels where it is lower.
 
     Missing physics may fill all bands of a residual, as friction that reverses does. A floor from
     repeated periods or a healthy recording stays.
 
     Args:
-        floor: of another fit to the held-out recordings.
-        study, data, fitted: as in `held_out_floor`.
+        floor: from the residuals of another fit.
+        study, data, train, held_out: as in `held_out_floor`.
     """
     if floor.method != "quiet band":
         return floor
-    return replace(floor, rms=np.minimum(floor.rms, held_out_floor(study, data, fitted).rms))
+    own = held_out_floor(study, data, train, held_out)
+    both = (floor.of_training.rms, own.of_training.rms)
+    return replace(floor, rms=np.minimum(floor.rms, own.rms), train_rms=np.minimum(*both))
 
 
 def find_period(recording: Recording) -> int:

@@ -4,6 +4,7 @@ adequate.py      the model on a healthy recording, other bases, outliers
 ends_of_range.py readings at the end of a sensor's range
 excitation.py    parameters that the training recordings do not excite
 failing_fit.py   where a model fails whose fit did not converge
+reversed_port.py a force port of the wrong sign
 sign.py          a channel that is counted the other way
 """
 
@@ -25,6 +26,7 @@ from rigwatch.workbench.explain.adequacy.excitation import (
     with_unjudged_told,
 )
 from rigwatch.workbench.explain.adequacy.failing_fit import with_failure_told
+from rigwatch.workbench.explain.adequacy.reversed_port import with_reversed_port
 from rigwatch.workbench.explain.adequacy.sign import reversed_channel
 
 __all__ = [
@@ -42,5 +44,6 @@ __all__ = [
     "with_base_offered",
     "with_change_told",
     "with_failure_told",
+    "with_reversed_port",
     "with_unjudged_told",
 ]

@@ -53,7 +53,7 @@ def floor_of(bench: Bench, fitted: Fitted) -> NoiseFloor:
     """
     if bench.data.of_healthy is not None or bench.floor.method != "quiet band":
         return bench.floor
-    return held_out_floor(bench.study, bench.data, fitted.held_out)
+    return held_out_floor(bench.study, bench.data, fitted.train, fitted.held_out)
 
 
 def reaches_noise(bench: Bench, fitted: Fitted) -> bool:
