@@ -27,32 +27,39 @@ effect, as a doubt needs less evidence than a name.
 def undetermined_if_parameters_changed(bench: Bench, found: Verdict, progress: Progress) -> Verdict:
     """The verdict, undetermined if the model's own parameters explain more than the effect named.
 
+    Two effects at once are undetermined if these parameters explain the error as well.
+
     Args:
         bench: a study along the measured motion.
         found: the verdict on effects.
         progress: called with a line of text as the fit begins.
     """
     best = found.best
-    if found.word != "missing_effect" or found.second or bench.study.kept is None or best is None:
+    if found.word != "missing_effect" or bench.study.kept is None:
         return found
-    # What may be left for the parameters to explain beside the effect.
-    if (
-        best.fitted is None
-        or bench.floor.left_over(bench.base.held_out, best.fitted.held_out) <= SHARE
-    ):
+    if best is None or best.fitted is None or not (found.second or _leaves_some(bench, best)):
         return found
-    progress(f"comparing {best.label} with changed parameters of the model")
+    named = " and ".join([best.label, *found.second[:1]])
+    progress(f"comparing {named} with changed parameters of the model")
     changed = _refitted(bench)
-    if changed is None or not _explains_more(bench, best, changed):
+    if changed is None or not bench.floor.reached(changed.held_out):
+        return found
+    if not (found.second or _explains_more(bench, best, changed)):
         return found
     unit = bench.base.told_in
+    left = "the noise" if found.second else f"{told(best.held_out_error, unit):.3g}"
     text = (
-        f"{best.label} lowers the held-out error to {told(best.held_out_error, unit):.3g}, changed"
+        f"{named} {'lower' if found.second else 'lowers'} the held-out error to {left}, changed"
         f" parameters of the model itself to {changed.told_error:.3g} {unit}: something that they"
         " stand for may have changed since the healthy recording, such as pressures, lines or"
         " friction of the healthy rig"
     )
     return replace(found, word="undetermined", text=text)
+
+
+def _leaves_some(bench: Bench, best: Ranked) -> bool:
+    """Whether something is left for the parameters to explain beside the effect."""
+    return best.fitted is not None and _left(bench, best.fitted) > SHARE
 
 
 def _refitted(bench: Bench) -> Fitted | None:
@@ -71,7 +78,7 @@ def _explains_more(bench: Bench, best: Ranked, changed: Fitted) -> bool:
     assert best.fitted is not None
     falls = difference(best.fitted.held_out, changed.held_out).p_falls
     more = _left(bench, best.fitted) - _left(bench, changed)
-    return bench.floor.reached(changed.held_out) and more > SHARE and falls < CHANCE
+    return more > SHARE and falls < CHANCE
 
 
 def _left(bench: Bench, fitted: Fitted) -> float:

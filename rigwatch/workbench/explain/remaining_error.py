@@ -101,7 +101,8 @@ def _remaining_in_training(base: Fitted, row: Ranked, floor: NoiseFloor) -> floa
     """The same of the training."""
     assert row.fitted is not None
     floor = floor.of_training
-    if floor.method == "healthy motion" or floor.reached(row.fitted.train):
+    at_floor = floor.reached(base.train) or floor.reached(row.fitted.train)
+    if floor.method == "healthy motion" or at_floor:
         return 0.0
     share = floor.left_over(base.train, row.fitted.train)
     return share if share > 1 - EXPLAINED else 0.0

@@ -40,6 +40,24 @@ def test_a_slower_motor_is_no_weaker_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("hidden", "word"),
+    [(Hidden(slower=0.15), "undetermined"), (Hidden(slower=0.15, dry=0.15), "missing_effect")],
+    ids=["slower", "slower and rubbing"],
+)
+def test_two_effects_at_once_are_named_unless_changed_parameters_explain_as_much(
+    tmp_path: Path, hidden: Hidden, word: str
+) -> None:
+    made = with_few_effects(bench(tmp_path, hidden, DRIVEN))
+    verdict = ranking(made)[1]
+    pair = replace(verdict, word="missing_effect", second=("viscous@load",))
+
+    found = undetermined_if_parameters_changed(made, pair, no_progress)
+
+    assert found.word == word
+    assert ("and viscous@load lower the held-out error" in found.text) == (word == "undetermined")
+
+
+@pytest.mark.parametrize(
     ("weaker", "rubbing", "label"), [(0.05, 0.0, "gain@drive"), (0.0, 0.15, "coulomb@load")]
 )
 def test_an_effect_that_leaves_nothing_is_named(

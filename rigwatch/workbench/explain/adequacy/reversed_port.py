@@ -14,6 +14,8 @@ from rigwatch.workbench.ranking import Ranked, left_over, rank_all
 
 MOST = 0.9
 """Share of the training error above noise that an effect of the wrong sign explains."""
+FAR = 0.75
+"""Share of the training error's energy that is above noise, at least: it is twice the noise."""
 LITTLE_LEFT = 0.25
 """Share that an effect of the right sign leaves at most where no port is suspected."""
 SAID = (
@@ -57,5 +59,6 @@ def _of_the_other_sign(bench: Bench, rows: Sequence[Ranked]) -> Ranked | None:
     every = rank_all(bench.study, bench.data, bench.base)
     found = [row for row in every if row.kind == "force" and row.label not in allowed]
     best = max(found, key=lambda row: row.explained, default=None)
-    most = MOST * bench.floor.of_training.above(bench.base.train)
-    return best if best is not None and best.explained >= most else None
+    above = bench.floor.of_training.above(bench.base.train)
+    suits = best is not None and above >= FAR and best.explained >= MOST * above
+    return best if suits else None
