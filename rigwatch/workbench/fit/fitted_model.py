@@ -1,7 +1,7 @@
 """A model with effects, fitted to the training recordings and judged on the held-out ones."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -274,11 +274,37 @@ def _trained(  # noqa: PLR0917 -- the arguments of `fit_model`
         if found is not best:
             return found, at_other_values(ended, found), horizon
         return begun_anew_nearby(best, data.train, horizon, substeps), ended, horizon
+    over_all = partial(last_fit, horizon, initial=first)
+    found = _of_free_run(study, data, fit_over, over_all, begin, from_short_horizons)
+    return _settled(study, data, found, horizon, substeps), None, horizon
+
+
+def _of_free_run(  # noqa: PLR0917 -- they belong together
+    study: Study,
+    data: Data,
+    fit_over: Callable[..., Fit],
+    over_all: Callable[..., Fit],
+    begin: FloatArray,
+    from_short_horizons: bool,
+) -> Fit:
+    """The fit, begun over short horizons where it is long, asked for, or runs away otherwise.
+
+    A spring that softens, begun too soft, lets the motion run away within a window. Over a part of
+    it its size is found.
+    """
     free_run = study.model.states and not data.along_motion
-    if free_run and (horizon >= LONG or from_short_horizons):
-        begin = fit_over(horizon // SHORTER, start=begin).parameters
-    found = _settled(study, data, last_fit(horizon, start=begin, initial=first), horizon, substeps)
-    return found, None, horizon
+    shorter = max(data.horizon // SHORTER, 1)
+    if free_run and (data.horizon >= LONG or from_short_horizons):
+        return over_all(start=fit_over(shorter, start=begin).parameters)
+    try:
+        return over_all(start=begin)
+    except ModelError as ran_away:
+        if not free_run:
+            raise
+        try:
+            return over_all(start=fit_over(shorter, start=begin).parameters)
+        except ModelError:
+            raise ran_away from None
 
 
 def _in_windows(recording: Recording, horizon: int) -> list[Recording]:

@@ -6,8 +6,8 @@ import pytest
 
 from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.explain import ranking
-from tests.workbench.doubts.test_noisier_training import DAMPER, run
 from tests.workbench.machine import studied
+from tests.workbench.own_machines.test_noisier_training import DAMPER, run
 
 UNITS = {"v": "m/s", "force": "N"}
 
