@@ -20,8 +20,9 @@ from rigwatch.workbench.data.next_rows import with_next_rows
 from rigwatch.workbench.data.one_rate import at_own_rates, on_one_rate
 from rigwatch.workbench.data.openings import without_openings
 from rigwatch.workbench.data.prediction import learns_from_healthy, predicts_along_motion
-from rigwatch.workbench.data.recorded_columns import read_columns, with_derived
+from rigwatch.workbench.data.recorded_columns import INTERPOLATED, read_columns, with_derived
 from rigwatch.workbench.data.signal_units import check_unit
+from rigwatch.workbench.data.smeared_steps import beside_steps
 from rigwatch.workbench.data.whole_windows import (
     counted_length,
     last_values,
@@ -235,6 +236,7 @@ def _recording(
 ) -> Recording:
     """Parts joined in sequence, each of whole windows so that no window spans two parts."""
     inputs, outputs, beyond = [], [], list[float]()
+    smeared = np.zeros(len(study.model.outputs), np.int64)
     for table in tables:
         length = counted_length(study, len(table), horizon)
         if length == 0:
@@ -245,11 +247,20 @@ def _recording(
         if length < len(table):
             beyond.append((len(table) - length) * table.dt)
         u, y = _matched(study, table)
+        if INTERPOLATED in table.altered:
+            beside = beside_steps(study.model, u)
+            y, smeared = np.where(beside, np.nan, y), smeared + beside.sum(axis=0)
         inputs.append(of_length(length, u, filler=last_values(u)))
         outputs.append(of_length(length, without_ends(study, y, table.dt), filler=np.nan))
     if beyond:
         share = sum(beyond) / sum(len(table) * table.dt for table in tables)
         remarks.append(_beyond(use, beyond, share, horizon * tables[0].dt))
+    remarks += [
+        f"{use}: {count} samples of {name} beside steps of an input are not counted, as samples are"
+        " interpolated there"
+        for name, count in zip(study.model.outputs, smeared, strict=True)
+        if count
+    ]
     thin = study.file.thin
     parts = tuple(len(u) for u in inputs)
     thinning = Thinning(thin.factor, thin.edge, parts) if thin else None

@@ -11,6 +11,7 @@ This makes no assumption about the distribution of block sizes. One large block 
 does not mask the others, as it does in a test that divides by the standard deviation.
 """
 
+import math
 from dataclasses import dataclass
 from itertools import product
 
@@ -86,7 +87,7 @@ def _correlation_time(one: FloatArray, other: FloatArray) -> float:
 
 def _p_value(blocks: FloatArray) -> float:
     """Share of all sign combinations whose sum is at least that of the blocks."""
-    total, size = float(np.sum(blocks)), float(np.sqrt(np.sum(blocks**2)))
+    total, size = float(np.sum(blocks)), math.hypot(*blocks)
     if size == 0:
         return 1.0
     if len(blocks) > ENUMERATED:
