@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 
 from rigwatch.workbench.data import Data, NoiseFloor
 from rigwatch.workbench.fit import Fitted, fit_model, fit_with_retry
-from rigwatch.workbench.ranking.acceptance import NEAR
+from rigwatch.workbench.ranking.acceptance import MATERIAL, NEAR
 from rigwatch.workbench.ranking.candidates import candidates
 from rigwatch.workbench.ranking.fit_selection import LEVEL, select_for_fit
-from rigwatch.workbench.ranking.ranked import SAME, Ranked, in_order, same_family
+from rigwatch.workbench.ranking.ranked import SAME, Ranked, error_ratio, in_order, same_family
 from rigwatch.workbench.ranking.refitting import (
     Fitting,
     Progress,
@@ -265,7 +265,9 @@ def _unfitted_similar(rows: Sequence[Ranked], floor: NoiseFloor) -> Ranked | Non
 
     Similar are those whose directions are nearly the best's, to first order, and those skipped in
     favour of an effect that is nearly as good: it may be named as the simpler one. Above the noise
-    floor also those parallel to it, and those that are similar to the best on many recordings.
+    floor also those parallel to it, and those that are similar to the best on many recordings. At
+    it one of those that are parallel, and the others if that one leaves more: a lag of many samples
+    is no delay, though to first order it is.
     """
     accepted = in_order([row for row in rows if row.accepted])
     if not accepted:
@@ -276,9 +278,21 @@ def _unfitted_similar(rows: Sequence[Ranked], floor: NoiseFloor) -> Ranked | Non
     alike += _skipped_for_nearly_as_good(accepted, waiting)
     assert best.fitted is not None
     if floor.reached(best.fitted.held_out):
-        return next((row for row, other in alike if other.cosines[row.label] <= SAME), None)
+        unlike = next((row for row, other in alike if other.cosines[row.label] <= SAME), None)
+        return unlike or _unfitted_parallel(best, rows, waiting)
     similar = [row for row, _ in alike]
     return next(iter(similar + _usually_similar(best, accepted, waiting)), None)
+
+
+def _unfitted_parallel(
+    best: Ranked, rows: Sequence[Ranked], waiting: Mapping[str, Ranked]
+) -> Ranked | None:
+    """A row parallel to the best to first order, unless one that is fitted leaves as little."""
+    parallel = [row for row in rows if best.cosines.get(row.label, 0.0) > SAME]
+    fitted = [row for row in parallel if row.fitted is not None]
+    if any(row.accepted and error_ratio(best, row) <= 1 + MATERIAL for row in fitted):
+        return None
+    return next((row for row in parallel if row.label in waiting), None)
 
 
 def _skipped_for_nearly_as_good(
