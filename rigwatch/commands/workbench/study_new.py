@@ -93,7 +93,8 @@ def run(arguments: argparse.Namespace) -> int:
     for remark in remarks:
         say(remark)
     tried, elective = suitable(study)
-    print(f"  {_effects(len(tried), len(elective))}; next: rigwatch explain {study.folder}")
+    print(f"  {_effects(len(tried), len(elective))}")
+    print(f"next: rigwatch explain {study.folder}")
     return 0
 
 

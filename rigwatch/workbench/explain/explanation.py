@@ -1,6 +1,6 @@
 """What an explanation says: verdict, ranking with strengths, how often such verdicts were wrong."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from rigwatch.physics.engine.search import at_bound
@@ -21,7 +21,13 @@ from rigwatch.workbench.explain.verdict_calibration import (
     probability_wrong_logged,
 )
 from rigwatch.workbench.fit import Value, as_written, values
-from rigwatch.workbench.ranking import Ranked, neutral_strength, vanishing_shape
+from rigwatch.workbench.ranking import (
+    MATERIAL,
+    Ranked,
+    error_ratio,
+    neutral_strength,
+    vanishing_shape,
+)
 from rigwatch.workbench.study import FILE, Study, assumed_values
 
 STRENGTH_TOLD = ("missing_effect", "undetermined")
@@ -128,7 +134,8 @@ def explanation(
     compared = comparison(bench)
     compared = replace(compared, remarks=[*compared.remarks, *told])
     listed = [
-        _row(row, members, more) if row is verdict.best else _row(row, row.alike) for row in rows
+        _row(row, members, more) if row is verdict.best else _row(row, _not_told_from(row, rows))
+        for row in rows
     ]
     unlike = "; ".join([*uncalibrated(bench), *_unlike_training(bench, verdict)])
     probability, similar = _reliability(bench, verdict)
@@ -221,6 +228,17 @@ def _reliability(bench: Bench, verdict: Verdict) -> tuple[float | None, tuple[in
     if later:
         return later_probability_wrong(), LATER_COUNTS
     return verdict.probability_wrong, cases_seen(verdict.word, verdict.evidence)
+
+
+def _not_told_from(row: Ranked, rows: Sequence[Ranked]) -> list[str]:
+    """Labels of effects like one to first order, but for those whose fit leaves more, or less."""
+    fitted = {each.label: each for each in rows if each.fitted is not None}
+    known = set[str]() if row.fitted is None else fitted.keys() & set(row.alike)
+    return [each for each in row.alike if each not in known or _same_error(row, fitted[each])]
+
+
+def _same_error(one: Ranked, other: Ranked) -> bool:
+    return abs(error_ratio(one, other) - 1) <= MATERIAL
 
 
 def _row(row: Ranked, alike: list[str], more: Mapping[str, float] | None = None) -> Row:

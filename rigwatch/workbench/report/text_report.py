@@ -21,6 +21,11 @@ BEYOND = (
     " there; if the bound is the machine's own, the model may lack something"
 )
 """What it means that a parameter is on a bound."""
+OF_ALL = (
+    "× channel noise: the error of each channel over the noise of its training recordings, as the"
+    " root mean square of all channels"
+)
+"""What the unit of an error of several channels means."""
 MOST_ROWS = 12
 """Rows of a printed ranking; `--json` has all."""
 MOST_RIVALS = 2
@@ -79,6 +84,18 @@ def comparison_lines(found: Comparison) -> list[str]:
     return lines + [f"note: {remark}" for remark in found.remarks]
 
 
+def _channel_lines(found: Comparison) -> list[str]:
+    """The error of each of several channels in its own unit."""
+    if len(found.channels) < 2:
+        return []
+    lines = [
+        f"  {name}: held out {number(c.told(c.held_out_error))} {c.told_in},"
+        f" noise floor {number(c.told(c.noise_floor))} {c.told_in}"
+        for name, c in found.channels.items()
+    ]
+    return [*lines, f"  {OF_ALL}"]
+
+
 def fit_lines(found: Comparison) -> list[str]:
     """Holds of the inputs and convergence of the fit."""
     lines = [f"  input {name}: {_held(held)}" for name, held in found.hold.items()]
@@ -130,6 +147,7 @@ def explanation_lines(found: Explanation) -> list[str]:
         f"now: training {base.told(base.train_error):.4g},"
         f" held out {base.told(base.held_out_error):.4g},"
         f" noise floor {base.told(base.noise_floor):.4g} {base.told_in}",
+        *_channel_lines(base),
         f"  noise floor from {base.noise_from}",
         *fit_lines(base),
         "",
