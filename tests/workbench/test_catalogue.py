@@ -128,6 +128,29 @@ def test_a_fixed_parameter_without_bounds_is_reported() -> None:
     assert not model_report(parse(bounded, Model, "given"), {}).unbounded
 
 
+@pytest.mark.parametrize("sign", ["-", "+"])
+def test_a_motion_that_grows_by_itself_is_reported(sign: str) -> None:
+    roll = f"""
+name = "ship"
+summary = "A ship that rolls."
+inputs.moment = {{ unit = "N m" }}
+states.phi = {{ unit = "rad", derivative = "p" }}
+states.p = {{ unit = "rad/s", derivative = "(moment - b*p {sign} G*phi)/I" }}
+parameters.I = {{ value = 2.0, unit = "kg m^2", low = 0.1 }}
+parameters.b = {{ value = 0.4, unit = "N m s/rad", low = 0.0 }}
+parameters.G = {{ value = 30.0, unit = "N m/rad", low = 1.0 }}
+outputs.roll = {{ unit = "deg", expression = "phi" }}
+"""
+    report = model_report(parse(roll, Model, "ship"), {})
+    assert report.growing == (("phi", "p") if sign == "+" else ())
+    assert report.fine
+
+
+@pytest.mark.parametrize("name", sorted(shipped_models()))
+def test_no_model_that_ships_grows_by_itself(name: str) -> None:
+    assert not model_report(shipped_models()[name], {}).growing
+
+
 def test_what_suits_a_port_is_counted_and_a_variable_that_no_effect_reads_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

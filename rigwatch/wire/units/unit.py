@@ -17,6 +17,9 @@ from functools import lru_cache
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.units.unit_table import BASES, ENTRIES, IN_OTHER_WORDS, Dimension, Entry
 
+JOINED = ("kg", "rad", "ohm", "Pa", "Hz", "N", "m", "s", "V", "A", "W", "K", "J")
+"""Units that people write as one word with others."""
+
 NONE: Dimension = (Fraction(0),) * len(BASES)
 """Of a pure number."""
 _GRAM = re.compile(r"(?<![A-Za-z])m?g(?![A-Za-z0-9])")
@@ -242,12 +245,23 @@ def _meant(name: str) -> str:
     lower = name.lower()
     if lower in IN_OTHER_WORDS:
         return f"did you mean {IN_OTHER_WORDS[lower]!r}?"
+    if apart := _written_apart(name):
+        return f"did you mean {apart!r}?"
     same = [known for known in ENTRIES if known.lower() == lower]
     same.sort(key=lambda known: sum(a != b for a, b in zip(name, known, strict=True)))
     close = same or difflib.get_close_matches(name, ENTRIES, 1)
     if close:
         return f"did you mean {close[0]!r}?"
     return "m, mm, kg, s, N, Pa, bar, V, A, ohm, rad or K, among others"
+
+
+def _written_apart(name: str) -> str:
+    """Units that are written as one word, such as "N m s^2" of "Nms2"; empty if it is no such."""
+    parts = re.findall(f"({'|'.join(JOINED)})([0-9]?)", name)
+    different = len(parts) > 1 and len(dict(parts)) == len(parts)
+    if not different or "".join(map("".join, parts)) != name:
+        return ""
+    return " ".join(unit + (f"^{power}" if power else "") for unit, power in parts)
 
 
 def times(one: Dimension, other: Dimension, power: Fraction | int = 1) -> Dimension:

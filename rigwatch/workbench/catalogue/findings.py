@@ -12,6 +12,8 @@ def findings(report: ModelReport) -> dict[str, tuple[tuple[str, ...], str]]:
         "unused": "used in no equation and at no port",
         "unseen": "no output depends on it, so no recording can determine it",
         "tied": "the outputs cannot distinguish it from another of these",
+        "growing": "moves away from where the file lets it start by itself, ever faster: a term of"
+        " the equations may have the wrong sign",
         "start": "no channel measures it: a fit estimates its initial value from the outputs",
         "absolute": "a temperature that multiplies something: 0 degC are 273.15 K; give a"
         " difference in K",

@@ -38,6 +38,10 @@ MOST, FINEST, SETTLED = 4000, 20.0, 5.0
 """Most samples of a run, samples per fastest time constant, slowest time constants per run."""
 SHOWN = 1e-9
 """Derivative by a state, relative to the largest, below which it is unobservable."""
+GROWS = 1e-4
+"""Rate of growth, over the fastest rate, from which a state moves away by itself."""
+TAKES_PART = 0.1
+"""Share of a growing motion from which a state is named."""
 DISTINGUISHABLE = 1e-7
 """Singular value, relative to the largest, above which states are distinguishable."""
 
@@ -50,6 +54,7 @@ class ModelReport:
         unused: parameters, quantities and inputs that no equation uses, by name.
         unseen: states that no output shows.
         tied: states that the outputs cannot distinguish.
+        growing: states that move away from the file's starting values by themselves.
         start: states that no channel measures, which start at the file's values.
         absolute: parameters in degC or degF that multiply something, as only a difference would.
         unbounded: fixed parameters without `low` and `high`, so that any value is taken.
@@ -63,6 +68,7 @@ class ModelReport:
     unused: tuple[str, ...]
     unseen: tuple[str, ...]
     tied: tuple[str, ...]
+    growing: tuple[str, ...]
     start: tuple[str, ...]
     absolute: tuple[str, ...]
     unbounded: tuple[str, ...]
@@ -99,6 +105,7 @@ def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> 
         unused=_unused(model, system),
         unseen=(),
         tied=(),
+        growing=(),
         start=start,
         absolute=_absolute_factors(model, system),
         unbounded=_unbounded(model),
@@ -111,7 +118,8 @@ def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> 
         return told
     for step in STEPS:
         given = dict.fromkeys(model.inputs, step) | _temperatures(model) | dict(inputs)
-        time, outputs, slopes = _run(system, {n: _in_si(model, n, at) for n, at in given.items()})
+        in_si = {n: _in_si(model, n, at) for n, at in given.items()}
+        time, outputs, slopes, by_states = _run(system, in_si)
         if np.isfinite(outputs).all() and np.isfinite(slopes).all():
             break
     else:
@@ -124,7 +132,8 @@ def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> 
         for column, (name, own) in enumerate(model.outputs.items())
     )
     unseen, tied = _observed(list(model.states), slopes)
-    return replace(told, unseen=unseen, tied=tied, inputs=given, run=curves)
+    growing = _growing(list(model.states), by_states)
+    return replace(told, unseen=unseen, tied=tied, growing=growing, inputs=given, run=curves)
 
 
 def inputs_of_run(model: Model, report: ModelReport) -> str:
@@ -199,10 +208,13 @@ def _unbounded(model: Model) -> tuple[str, ...]:
     return tuple(n for n, p in given.items() if math.isinf(p.low) and math.isinf(p.high))
 
 
-def _run(system: System, inputs: Mapping[str, float]) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _run(
+    system: System, inputs: Mapping[str, float]
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Time (n,), outputs (n, outputs), their derivatives by initial states (n·outputs, states).
 
-    The derivatives are free of units.
+    These are free of units. And those of the states' rates by the states, (states, states), at the
+    start.
     """
     compiled = compile_system(system)
     first = np.array([[state.start for state in system.states.values()]])
@@ -218,7 +230,7 @@ def _run(system: System, inputs: Mapping[str, float]) -> tuple[FloatArray, Float
         np.repeat(values, count, 0), dt, at, count, initial=first, parameters=parameters
     )
     slopes = _without_units(made.slopes[0, :, :, free : free + states], by_states)
-    return np.arange(count, dtype=np.float64) * dt, made.outputs[0], slopes
+    return np.arange(count, dtype=np.float64) * dt, made.outputs[0], slopes, by_states
 
 
 def _without_units(slopes: FloatArray, by_states: FloatArray) -> FloatArray:
@@ -249,6 +261,15 @@ def _grid(rates: FloatArray) -> tuple[float, int]:
     fastest, slowest = float(moving.max()), float(moving.min())
     dt = min(max(1 / (FINEST * fastest), SETTLED / slowest / MOST), 1 / fastest)
     return dt, max(min(round(SETTLED / slowest / dt), MOST), 200)
+
+
+def _growing(names: list[str], by_states: FloatArray) -> tuple[str, ...]:
+    """States that take part in a motion of the linear model that grows."""
+    balanced, _ = matrix_balance(by_states, permute=False, separate=True)
+    rates, motions = np.linalg.eig(balanced)
+    grows = rates.real > GROWS * max(float(np.abs(rates).max()), 1e-300)
+    share = np.abs(motions[:, grows]).max(axis=1, initial=0.0)
+    return tuple(name for name, own in zip(names, share.tolist(), strict=True) if own > TAKES_PART)
 
 
 def _observed(names: list[str], slopes: FloatArray) -> tuple[tuple[str, ...], tuple[str, ...]]:

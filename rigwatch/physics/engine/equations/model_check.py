@@ -131,7 +131,16 @@ def _check_unit(key: str, state: State, channel: str, own: Input | Output) -> No
     """Check that a channel can be a state, or that the state can be its rate."""
     rate = key.endswith("rate_of")
     told, has = (part.shown or part.unit for part in (own, state))
-    fits = times(unit_of(own.unit).dimension, unit_of("s").dimension, -1 if rate else 0)
+    itself = unit_of(own.unit).dimension
+    its_rate = times(itself, unit_of("s").dimension, -1)
+    fits, other = (its_rate, itself) if rate else (itself, its_rate)
+    if unit_of(state.unit).dimension == other:
+        meant = "`measured`, as the channel shows the state itself"
+        if not rate:
+            meant = "`rate_of`, as the state is the channel's rate of change"
+        raise ModelError(
+            f"{key}: found channel {channel!r} in {told} for a state in {has}, expected {meant}"
+        )
     if unit_of(state.unit).dimension != fits:
         raise ModelError(
             f"{key}: found channel {channel!r} in {told} for a state in {has}, expected"
