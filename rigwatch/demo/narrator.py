@@ -267,9 +267,8 @@ class Narrator:
             # An explanation bears the name of the first alarm, which is mostly a departure.
             if newest == ALARM or event.text.startswith(ALARM):
                 force, times = f"{self._size * self._known:.2f} N", f"{self._size:.2f} times"
-                known = f"{self._known:g} N of the recording with known friction"
-                self._say(f"            measured friction: {force}, {times} the")
-                self._say(f"            {known}, from which its model was made")
+                self._say(f"            measured friction: {force}, {times} that of the recording")
+                self._say("            with known friction, from which its model was made")
             effect = re.search(r"(\w+)@(\w+)", found)  # an effect at a port: effect@port
             if effect:
                 self._say(f"            more about it: $ rigwatch effects {effect[1]}")

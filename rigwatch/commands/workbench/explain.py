@@ -59,8 +59,8 @@ def _run_one(arguments: argparse.Namespace, folder: Path) -> int:
         study = with_whole_library(study)
     found = explain(study, progress=say)
     following = next_step(found, f"{folder}")
-    waiting = found.verdict == "unknown_effect" and not tries_rarer(study)
-    rarer = suitable(study)[1] if waiting else []
+    waiting = not (found.tried_rarer or tries_rarer(study))
+    rarer = suitable(study)[1] if found.verdict == "unknown_effect" and waiting else []
     if rarer:
         following = RARER.format(count=len(rarer), study=folder)
     lines = [*explanation_lines(found), *([f"next: {following}"] if following else [])]

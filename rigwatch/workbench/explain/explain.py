@@ -211,20 +211,23 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
     rows = rank_all(wider, bench.data, bench.base)
     least = SHOWN if by_training else BY_CHANCE
     if not any(row.effect in rarer and row.p_value < least for row in rows):
-        return _unless_named(first, f"nor is it like one of {len(rarer)} rarer ones")
+        return _with_rarer_tried(first, f"nor is it like one of {len(rarer)} rarer ones")
     progress(f"no usual effect explains the error: trying {len(rarer)} rarer ones")
     rows = rank(wider, bench.data, bench.base, bench.floor, progress, known=first.rows)
     none = f"nor does one of {len(rarer)} rarer ones"
     leads = _trains_better if by_training else _leaves_less
     if not any(row.effect in rarer and leads(first, row) for row in rows):
-        return _unless_named(first, none)
+        return _with_rarer_tried(first, none)
     second = _explained_once(replace(bench, study=wider), progress, rows, first)
     found = second.explanation
     if found.verdict not in STRENGTH_TOLD or not _is_better(first, second):
-        return _unless_named(first, none)
+        return _with_rarer_tried(first, none)
     text = RARER.format(text=found.text, count=len(rarer))
     unlike = "; ".join([*filter(None, [found.unlike]), SECOND_PASS])
-    doubted = replace(found, text=text, unlike=unlike, wrong_probability=None, wrong_at_most=None)
+    doubted = replace(
+        found, text=text, unlike=unlike, wrong_probability=None, wrong_at_most=None,
+        tried_rarer=True,
+    )  # fmt: skip
     # Usual effects found nothing to explain: one of many rarer ones is not named with confidence.
     if told.verdict == "nothing_missing" and found.verdict == "missing_effect":
         doubted = _unsure(doubted)
@@ -288,12 +291,11 @@ def _halves(first: Explained, row: Ranked) -> bool:
     return first.bench.floor.left_over(before.held_out, after.held_out) <= HALF**2
 
 
-def _unless_named(found: Explained, more: str) -> Explained:
-    """An explanation that names no effect, with a further remark; any other unchanged."""
-    told = found.explanation
-    if told.verdict != "unknown_effect":
-        return found
-    return replace(found, explanation=replace(told, text=f"{told.text}; {more}"))
+def _with_rarer_tried(found: Explained, more: str) -> Explained:
+    """An explanation after the rarer effects; with a further remark if it names no effect."""
+    told = replace(found.explanation, tried_rarer=True)
+    text = f"{told.text}; {more}" if told.verdict == "unknown_effect" else told.text
+    return replace(found, explanation=replace(told, text=text))
 
 
 def with_whole_library(study: Study) -> Study:

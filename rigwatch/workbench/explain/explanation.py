@@ -95,6 +95,7 @@ class Explanation:
         exchange: an effect that describes the last accepted one better, if nothing beside it
             explains the error; None if none does, or if that was not asked.
         on_bound: names of the named effect's own parameters that are on a bound.
+        tried_rarer: whether the library's rarer effects were tried in a second pass.
     """
 
     verdict: str
@@ -114,6 +115,7 @@ class Explanation:
     remains: float = 0.0
     altered: list[str] = field(default_factory=list)
     on_bound: list[str] = field(default_factory=list)
+    tried_rarer: bool = False
 
 
 def explanation(
