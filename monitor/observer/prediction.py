@@ -39,11 +39,15 @@ from rigwatch.physics.engine.equations import (
     spelt_out,
     with_variants,
 )
-from rigwatch.wire.arrays import BoolArray, FloatArray
+from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
 
 SETTLING = 8.0
-"""Time for which the first sample is held, so that hidden states start in equilibrium [s]."""
+"""Time for which the first sample is held, so that hidden states start in equilibrium [s].
+
+After as long a rest they stay as they are, so that a start after a night is one as after minutes:
+the model may not know what holds the rig at rest.
+"""
 SUBSTEPS = 4
 """Runge-Kutta steps between samples."""
 PAUSE = 32
@@ -215,6 +219,7 @@ class AlongMotion:
         self._slow = plant.turn
         self._last = dict.fromkeys(Run, np.zeros(0))
         self._pause = -1
+        self._rested, self._settled = 0, round(SETTLING * rate)
 
     def follow(self, usual: FloatArray | None) -> None:
         """Use these means of the hidden states of a healthy rig, shape (hidden,), if known."""
@@ -245,20 +250,34 @@ class AlongMotion:
         out = Predicted(
             np.zeros((n, len(Run))), np.zeros((n, len(Run), self.hidden)), np.zeros(n, np.bool_)
         )
-        begin = 0
+        begin, rests = 0, self._long_rests(rows, steps[0], state)
+        alike = 2 * rests + moves
         while begin < n:
             if state[begin] == EMPTY:
                 begin += 1
                 continue
             if state[begin] == FIRST:
                 self._begin(rows[begin], steps[0, begin])
-            end = _end(state, moves, begin)
+            end = _end(state, alike, begin)
             own = {run: each[begin:end] for run, each in given.items()}
-            begin += self._run(own, bool(moves[begin]), begin, out)
+            begin += self._run(own, begin, out, moves=bool(moves[begin]), rests=bool(rests[begin]))
             if out.reset[begin - 1]:
                 self._pause = PAUSE
                 self._wait(state[begin - 1 :])
         return out
+
+    def _long_rests(self, rows: FloatArray, steps: FloatArray, state: Codes) -> BoolArray:
+        """Samples of a rest through which hidden states stay as they are, shape (n,)."""
+        still = np.abs(rows[:, self._rates]).max(axis=1, initial=0.0) <= self._slow
+        still &= ~steps.any(axis=1) & (state != EMPTY)
+        rests = np.zeros(len(rows), np.bool_)
+        for k in range(len(rows)):
+            if state[k] == FIRST and still[k]:
+                self._rested = self._settled
+            else:
+                rests[k] = still[k] and self._rested >= self._settled
+                self._rested = self._rested + 1 if still[k] else 0
+        return rests
 
     def _wait(self, state: Codes) -> None:
         """Mark the rows of a pause, and the first after it."""
@@ -288,24 +307,28 @@ class AlongMotion:
         for run, parameters in zip(Run, self._parameters, strict=True):
             self._states[run] = balanced(self._compiled, parameters, still, self._dt)
 
-    def _run(self, rows: Rows, moves: bool, first: int, out: Predicted) -> int:
+    def _run(self, rows: Rows, first: int, out: Predicted, *, moves: bool, rests: bool) -> int:
         """Run along the rows until they end or diverge; returns the number done.
 
         Args:
             rows: of each run.
-            moves: whether those with edges between samples differ from the plain ones.
             first: index of the first row.
             out: to be filled.
+            moves: whether those with edges between samples differ from the plain ones.
+            rests: whether hidden states stay as they are.
         """
         given = {run: np.concatenate([self._last[run][None, :], rows[run]]) for run in Run}
-        made = {run: self._simulated(run, given[run]) for run in Run if moves or run != Run.MOVED}
+        different = [run for run in Run if moves or run != Run.MOVED]
+        made = {run: self._simulated(run, given[run], rests=rests) for run in different}
         if not moves:
             made[Run.MOVED] = made[Run.PLAIN]
-        outputs = np.stack([made[run].outputs[0, 1:] for run in Run], axis=1)
+        parts = [made[run].outputs[:, 1:].reshape(-1, 1 + self.hidden) for run in Run]
+        outputs = np.stack(parts, axis=1)
         # Also false for NaN; the hidden states are among the outputs.
         within = (np.abs(outputs) <= LARGEST).all(axis=(1, 2))
         if good := bool(within.all()):
-            self._states = [made[run].last[0] for run in Run]
+            if not rests:
+                self._states = [made[run].last[0] for run in Run]
             self._last = {run: own[-1].copy() for run, own in rows.items()}
         kept = len(outputs) if good else int(np.argmin(within))
         at, outputs = slice(first, first + kept), outputs[:kept]
@@ -315,12 +338,14 @@ class AlongMotion:
         out.reset[first + kept] = True
         return kept + 1
 
-    def _simulated(self, run: Run, inputs: FloatArray) -> Simulation:
+    def _simulated(self, run: Run, inputs: FloatArray, *, rests: bool) -> Simulation:
+        """One run along the rows; at rest one for each row, from the same hidden states."""
+        begins = np.arange(len(inputs) - 1 if rests else 1)
         with np.errstate(over="ignore", invalid="ignore"):
             return self._compiled.simulate(
-                inputs, self._dt, np.zeros(1, np.int64), len(inputs),
-                initial=self._states[run][None, :], parameters=self._parameters[run],
-                substeps=SUBSTEPS,
+                inputs, self._dt, begins, 2 if rests else len(inputs),
+                initial=np.repeat(self._states[run][None, :], len(begins), axis=0),
+                parameters=self._parameters[run], substeps=SUBSTEPS,
             )  # fmt: skip
 
 
@@ -335,10 +360,10 @@ def _given(rows: FloatArray, steps: FloatArray, moved: FloatArray) -> Rows:
     return dict.fromkeys(Run, rows) | changed
 
 
-def _end(state: Codes, moves: BoolArray, begin: int) -> int:
+def _end(state: Codes, alike: IntArray, begin: int) -> int:
     """Where a run of samples with a complete kernel ends; a change begins a new one."""
     for k in range(begin + 1, state.size):
-        if moves[k] != moves[begin] or state[k] in (EMPTY, FIRST):
+        if alike[k] != alike[begin] or state[k] in (EMPTY, FIRST):
             return k
     return int(state.size)
 
