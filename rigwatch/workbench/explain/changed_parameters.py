@@ -15,19 +15,20 @@ from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.explain.rough_verdict import SHARE
 from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.fit import Fitted, fit_model, with_kept_free
-from rigwatch.workbench.ranking import Progress, Ranked, difference
-from rigwatch.workbench.study import told
+from rigwatch.workbench.ranking import Progress, difference
 
 CHANCE = 0.1
 """One-sided level at which changed parameters are better: it is higher than that of accepting an
 effect, as a doubt needs less evidence than a name.
 """
+CHANCE_OF_TWO = 1e-3
+"""The same against two effects, which leave no more than noise: the parameters, of which there are
+many more, also explain a little of what the base leaves of the healthy rig.
+"""
 
 
 def undetermined_if_parameters_changed(bench: Bench, found: Verdict, progress: Progress) -> Verdict:
-    """The verdict, undetermined if the model's own parameters explain more than the effect named.
-
-    Two effects at once are undetermined if these parameters explain the error as well.
+    """The verdict, undetermined if the model's own parameters explain more than what is named.
 
     Args:
         bench: a study along the measured motion.
@@ -35,31 +36,26 @@ def undetermined_if_parameters_changed(bench: Bench, found: Verdict, progress: P
         progress: called with a line of text as the fit begins.
     """
     best = found.best
-    if found.word != "missing_effect" or bench.study.kept is None:
+    if found.word != "missing_effect" or bench.study.kept is None or best is None:
         return found
-    if best is None or best.fitted is None or not (found.second or _leaves_some(bench, best)):
+    # Of one effect: what may be left for the parameters to explain beside it.
+    fitted = found.together or best.fitted
+    if fitted is None or not (found.together or _left(bench, fitted) > SHARE):
         return found
     named = " and ".join([best.label, *found.second[:1]])
     progress(f"comparing {named} with changed parameters of the model")
     changed = _refitted(bench)
-    if changed is None or not bench.floor.reached(changed.held_out):
-        return found
-    if not (found.second or _explains_more(bench, best, changed)):
+    if changed is None or not _explains_more(bench, fitted, changed, two=bool(found.together)):
         return found
     unit = bench.base.told_in
-    left = "the noise" if found.second else f"{told(best.held_out_error, unit):.3g}"
     text = (
-        f"{named} {'lower' if found.second else 'lowers'} the held-out error to {left}, changed"
+        f"{named} {'lower' if found.together else 'lowers'} the held-out error to"
+        f" {fitted.told_error:.3g}, changed"
         f" parameters of the model itself to {changed.told_error:.3g} {unit}: something that they"
         " stand for may have changed since the healthy recording, such as pressures, lines or"
         " friction of the healthy rig"
     )
     return replace(found, word="undetermined", text=text)
-
-
-def _leaves_some(bench: Bench, best: Ranked) -> bool:
-    """Whether something is left for the parameters to explain beside the effect."""
-    return best.fitted is not None and _left(bench, best.fitted) > SHARE
 
 
 def _refitted(bench: Bench) -> Fitted | None:
@@ -73,12 +69,13 @@ def _refitted(bench: Bench) -> Fitted | None:
         return None
 
 
-def _explains_more(bench: Bench, best: Ranked, changed: Fitted) -> bool:
-    """Whether it explains a share of the error that an effect named alone may not leave."""
-    assert best.fitted is not None
-    falls = difference(best.fitted.held_out, changed.held_out).p_falls
-    more = _left(bench, best.fitted) - _left(bench, changed)
-    return more > SHARE and falls < CHANCE
+def _explains_more(bench: Bench, named: Fitted, changed: Fitted, *, two: bool) -> bool:
+    """Whether it explains more than two effects, or a share that one named alone may not leave."""
+    if not bench.floor.reached(changed.held_out):
+        return False
+    falls = difference(named.held_out, changed.held_out).p_falls
+    more = _left(bench, named) - _left(bench, changed)
+    return falls < CHANCE_OF_TWO if two else more > SHARE and falls < CHANCE
 
 
 def _left(bench: Bench, fitted: Fitted) -> float:

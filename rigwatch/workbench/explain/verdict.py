@@ -75,6 +75,7 @@ class Verdict:
         second: labels of the second missing effect, if two are missing at once.
         evidence: what the verdict is based on.
         beside: labels of the other effects of the set that it was judged in.
+        together: the fit with both effects, if two are missing at once.
     """
 
     word: Word
@@ -85,6 +86,7 @@ class Verdict:
     second: tuple[str, ...] = ()
     evidence: Evidence = field(default_factory=Evidence)
     beside: tuple[str, ...] = ()
+    together: Fitted | None = None
 
     @property
     def probability_wrong(self) -> float:

@@ -49,7 +49,10 @@ def test_two_effects_at_once_are_named_unless_changed_parameters_explain_as_much
 ) -> None:
     made = with_few_effects(bench(tmp_path, hidden, DRIVEN))
     verdict = ranking(made)[1]
-    pair = replace(verdict, word="missing_effect", second=("viscous@load",))
+    assert verdict.best is not None
+    both = verdict.best.fitted
+    second = ("viscous@load",)
+    pair = replace(verdict, word="missing_effect", second=second, together=both)
 
     found = undetermined_if_parameters_changed(made, pair, no_progress)
 

@@ -251,4 +251,4 @@ def _both_named(bench: Bench, first: Verdict, second: Verdict, together: Fitted)
     word: Word = "missing_effect" if certain else "undetermined"
     also = f"{named[0]} as well" if certain else f"probably {' or '.join(named)} as well"
     text = f"{first.best.label} is missing, and {also}"
-    return dataclasses.replace(first, word=word, text=text, second=named)
+    return dataclasses.replace(first, word=word, text=text, second=named, together=together)
