@@ -189,7 +189,7 @@ def test_a_strength_that_only_its_shape_leaves_open_is_told_so(
 def test_what_helps_a_little_is_not_called_the_answer(tmp_path: Path) -> None:
     found = explain(damper(tmp_path, ever_denser))
     assert found.verdict == "unknown_effect"
-    assert "92% of the training error's energy remains, 13 times the noise floor" in found.text
+    assert "92% of the training error's energy remains, 12 times the noise floor" in found.text
     assert "also accepted" in found.text
     assert "stribeck@load" in found.text
 
