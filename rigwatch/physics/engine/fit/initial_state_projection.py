@@ -62,7 +62,7 @@ def _split(slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _inverse(triangle: FloatArray) -> FloatArray:
     """The pseudo-inverse; where no state is unobservable the inverse, in a fraction of the time."""
-    with contextlib.suppress(np.linalg.LinAlgError):
+    with contextlib.suppress(np.linalg.LinAlgError), np.errstate(over="ignore"):
         inverse = np.linalg.inv(triangle)
         # The condition is at most the product of the Frobenius norms.
         squares = np.sum(triangle**2, axis=(1, 2)) * np.sum(inverse**2, axis=(1, 2))

@@ -197,16 +197,13 @@ def _smallest_error(
         return (own if prior is None else np.vstack([own, prior.slopes])) * unit
 
     try:
-        found = scipy.optimize.least_squares(
-            residuals,
-            np.full(len(theta), FAR),
-            jac=slopes,
-            bounds=(FAR + (low - theta) / unit, FAR + (high - theta) / unit),
-            x_scale="jac",
-            ftol=CONVERGED if prior is None else SETTLED,
-            xtol=CLOSE / FAR,
-            max_nfev=60,
-        )
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = scipy.optimize.least_squares(
+                residuals, np.full(len(theta), FAR), jac=slopes,
+                bounds=(FAR + (low - theta) / unit, FAR + (high - theta) / unit),
+                x_scale="jac", ftol=CONVERGED if prior is None else SETTLED, xtol=CLOSE / FAR,
+                max_nfev=60,
+            )  # fmt: skip
     except (ValueError, np.linalg.LinAlgError) as error:
         # Finite slopes may still overflow when squared.
         raise ModelError(

@@ -253,11 +253,12 @@ class _ContinuedWindows:
             return np.asarray(own * steps)
 
         try:
-            found = scipy.optimize.least_squares(
-                residuals, np.full(len(begin), FAR), jac=slopes,
-                bounds=(FAR + (low - begin) / unit, FAR + (high - begin) / unit),
-                x_scale="jac", ftol=CONVERGED, xtol=CLOSE / FAR, max_nfev=MOST,
-            )  # fmt: skip
+            with np.errstate(over="ignore", invalid="ignore"):
+                found = scipy.optimize.least_squares(
+                    residuals, np.full(len(begin), FAR), jac=slopes,
+                    bounds=(FAR + (low - begin) / unit, FAR + (high - begin) / unit),
+                    x_scale="jac", ftol=CONVERGED, xtol=CLOSE / FAR, max_nfev=MOST,
+                )  # fmt: skip
         except (ValueError, np.linalg.LinAlgError) as error:
             raise ModelError(
                 f"{self._problem.system.model.name}: the search diverged (NaN or infinite);"

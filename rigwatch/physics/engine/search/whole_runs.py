@@ -229,17 +229,14 @@ class WholeRuns:
             return _Look(z, float(residual @ residual) / 2, rms, 0.0)
         low, high = self._unknowns.low, self._unknowns.high
         evaluated = Latest(self._simulated)
-        found = least_squares(
-            lambda at: evaluated(at)[0],
-            np.clip(z, low, high),
-            jac=lambda at: evaluated(at)[1],
-            bounds=(low, high),
-            loss="soft_l1" if np.isfinite(self._robust) else "linear",
-            f_scale=self._robust if np.isfinite(self._robust) else 1.0,
-            ftol=1e-4,
-            xtol=1e-4,
-            max_nfev=most,
-        )
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = least_squares(
+                lambda at: evaluated(at)[0], np.clip(z, low, high),
+                jac=lambda at: evaluated(at)[1], bounds=(low, high),
+                loss="soft_l1" if np.isfinite(self._robust) else "linear",
+                f_scale=self._robust if np.isfinite(self._robust) else 1.0,
+                ftol=1e-4, xtol=1e-4, max_nfev=most,
+            )  # fmt: skip
         residual = found.fun[: -len(z)]
         rms = float(np.sqrt(residual @ residual / self._counted))
         promised = _promise(found, low, high)
