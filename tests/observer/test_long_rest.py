@@ -34,7 +34,7 @@ def modelled(rest_s: float) -> np.ndarray:
     return found.estimates.column("modelled_acceleration").values[round(rest_s * RATE) :]
 
 
-@pytest.mark.parametrize("rest_s", [20.0, 120.0])
+@pytest.mark.parametrize("rest_s", [20.0, pytest.param(120.0, marks=pytest.mark.nightly)])
 def test_a_start_after_a_long_rest_is_one_as_after_a_short_one(rest_s: float) -> None:
     short = modelled(1.0)
     assert np.abs(short).max() > 1.0
