@@ -3,9 +3,9 @@
 Before anything is known to be missing, an input that seems to act late, by half a sample as one
 that is held or by a part of it, also stands for what is slow: a sensor, a winding, a filter. What
 is left then speaks for another effect. So the hold is chosen once more with something slow in the
-model. If both together leave less than the best effect beside the first hold, beyond chance, all
-effects are ranked with the hold that belongs to it. If both leave the same, the recordings cannot
-tell, and both are said.
+model, or with the best effect if it leaves more than noise. If both together leave less than the
+best effect beside the first hold, beyond chance, all effects are ranked with the hold that belongs
+to it. If both leave the same, the recordings cannot tell, and both are said.
 """
 
 from collections.abc import Iterator
@@ -63,7 +63,10 @@ def with_hold_decided(
     progress("choosing how inputs act between samples with something slow in the model")
     try:
         slow, study, fitted = with_hold_beside(
-            bench.study, bench.data, bench.base, list(_slow_at_ports(bench))
+            bench.study,
+            bench.data,
+            bench.base,
+            [*_slow_at_ports(bench), *_leaves_more(bench, best)],
         )
     except ModelError:
         return as_found
@@ -73,6 +76,13 @@ def with_hold_decided(
     if best is None or best.effect == SLOW or explains_more(left, fitted):
         return as_found
     return replace(as_found, rival=slow, text=_text(bench.study, best.label, slow, study))
+
+
+def _leaves_more(bench: Bench, best: Ranked | None) -> list[Placement]:
+    """The best effect, if it leaves more than noise beside a hold that was chosen without it."""
+    if best is None or best.fitted is None or bench.floor.reached(best.fitted.held_out):
+        return []
+    return [best.placement]
 
 
 def _is_undetermined(bench: Bench) -> bool:

@@ -20,13 +20,17 @@ parameters.b = { value = 0.1, unit = "N m s/rad", low = 0.0 }
 parameters.G = { value = 93.0, unit = "N m/rad", low = 0.1, high = 1000.0 }
 outputs.roll = { unit = "rad", expression = "phi" }
 outputs.rate = { unit = "rad/s", expression = "p" }
-ports.hull = { kind = "force", unit = "N m", variables.x = { expression = "phi", unit = "rad" } }
+[ports.hull]
+kind = "force"
+unit = "N m"
+variables.x = { expression = "phi", unit = "rad" }
+variables.v = { expression = "p", unit = "rad/s" }
 """
 RATE, SUBSTEPS = 20.0, 20
 INERTIA, DAMPING, RIGHTING, SOFTER = 2.4, 0.5, 30.0, -11.0
 
 
-def rolled(seed: int, seconds: float = 120.0) -> Table:
+def rolled(seed: int, softer: float = SOFTER, drag: float = 0.0, seconds: float = 120.0) -> Table:
     """Roll angle and rate under a slow random moment, read with noise."""
     draw = np.random.default_rng(seed)
     count = round(seconds * RATE)
@@ -38,7 +42,9 @@ def rolled(seed: int, seconds: float = 120.0) -> Table:
     for n, push in enumerate(moment):
         if n % SUBSTEPS == 0:
             angles[n // SUBSTEPS], rates[n // SUBSTEPS] = angle, rate
-        force = push - DAMPING * rate - RIGHTING * angle - SOFTER * angle**3
+        force = (
+            push - DAMPING * rate - RIGHTING * angle - softer * angle**3 - drag * rate * abs(rate)
+        )
         rate += force / INERTIA / (RATE * SUBSTEPS)
         angle += rate / (RATE * SUBSTEPS)
     noise = draw.normal(size=(2, count))

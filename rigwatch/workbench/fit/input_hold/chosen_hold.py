@@ -85,7 +85,7 @@ def with_hold_beside(
         with suppress(ModelError):
             lines.append((trials, trials.fitted("linear", 0.0, start, base)))
     if not lines:
-        raise ModelError("the model cannot be fitted with something slow at any port")
+        raise ModelError("the model cannot be fitted with any of these effects")
     trials, line = min(lines, key=lambda pair: pair[1].size)
     best = best_hold(trials, line, quiet_scale(data.train))
     placement = trials.placements[-1]
