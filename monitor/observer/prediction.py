@@ -266,10 +266,14 @@ class AlongMotion:
                 self._wait(state[begin - 1 :])
         return out
 
+    def _moves(self, rows: FloatArray, steps: FloatArray) -> BoolArray:
+        """Whether the rig or its drive moves at each row, shape (n,)."""
+        speed = np.abs(rows[:, self._rates]).max(axis=1, initial=0.0)
+        return np.asarray((speed > self._slow) | steps.any(axis=1))
+
     def _long_rests(self, rows: FloatArray, steps: FloatArray, state: Codes) -> BoolArray:
         """Samples of a rest through which hidden states stay as they are, shape (n,)."""
-        still = np.abs(rows[:, self._rates]).max(axis=1, initial=0.0) <= self._slow
-        still &= ~steps.any(axis=1) & (state != EMPTY)
+        still = ~self._moves(rows, steps) & (state != EMPTY)
         rests = np.zeros(len(rows), np.bool_)
         for k in range(len(rows)):
             if state[k] == FIRST and still[k]:
@@ -298,8 +302,7 @@ class AlongMotion:
         sensor's corner.
         """
         self._last = dict.fromkeys(Run, row.copy())
-        moves = np.abs(row[self._rates]).max(initial=0.0) > self._slow or np.any(steps)
-        if self._usual is not None and moves:
+        if self._usual is not None and self._moves(row[None, :], steps[None, :])[0]:
             self._states = [self._usual] * len(Run)
             return
         still = np.repeat(row[None, :], round(SETTLING / self._dt), axis=0)

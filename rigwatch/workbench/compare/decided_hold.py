@@ -15,7 +15,7 @@ from rigwatch.physics.engine.equations import Placement
 from rigwatch.physics.engine.score import suits
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.preparation import Bench, bench_of
-from rigwatch.workbench.data import port_sizes, quiet_scale
+from rigwatch.workbench.data import port_sizes, scale_of_several
 from rigwatch.workbench.fit import explains_more, fit_model, may_hide_slow, with_hold_beside
 from rigwatch.workbench.ranking import Progress, Ranked, in_order, no_progress, rank, refit
 from rigwatch.workbench.study import Held, Study
@@ -61,13 +61,9 @@ def with_hold_decided(
     if _is_undetermined(bench) or not may_hide_slow(bench.study, bench.data):
         return as_found
     progress("choosing how inputs act between samples with something slow in the model")
+    beside = [*_slow_at_ports(bench), *_leaves_more(bench, best)]
     try:
-        slow, study, fitted = with_hold_beside(
-            bench.study,
-            bench.data,
-            bench.base,
-            [*_slow_at_ports(bench), *_leaves_more(bench, best)],
-        )
+        slow, study, fitted = with_hold_beside(bench.study, bench.data, bench.base, beside)
     except ModelError:
         return as_found
     left = bench.base if best is None or best.fitted is None else best.fitted
@@ -124,11 +120,8 @@ def with_hold_of(bench: Bench, placement: Placement) -> Bench | None:
 
 def _bench_of(bench: Bench, study: Study) -> Bench | None:
     """The bench with the hold of another instance of its study; None if that cannot be fitted."""
-    train = bench.data.train
     try:
-        return bench_of(
-            study, bench.data, quiet_scale(train) if train.outputs.shape[1] > 1 else None
-        )
+        return bench_of(study, bench.data, scale_of_several(bench.data.train))
     except ModelError:
         return None
 

@@ -23,7 +23,7 @@ from rigwatch.physics.engine.fit import Recording, filled
 from rigwatch.physics.engine.score import autocorrelation, first_below
 from rigwatch.wire.arrays import BoolArray, ComplexArray, FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.data import Data, predicts_along_motion, prepare, quiet_scale
+from rigwatch.workbench.data import Data, predicts_along_motion, prepare, scale_of_several
 from rigwatch.workbench.fit import Fitted, eigenvalues, fit_base, with_hold
 from rigwatch.workbench.study import Study
 
@@ -134,7 +134,7 @@ def _with_source(study: Study, source: str, horizon: float | None = None) -> Stu
 def _fitted_once(study: Study) -> tuple[Fitted, Data]:
     """The model fitted to the training recordings, and these, cut to whole windows."""
     data = prepare(study)
-    scale = quiet_scale(data.train) if data.train.outputs.shape[1] > 1 else None
+    scale = scale_of_several(data.train)
     return fit_base(with_hold(study, data, scale), data, scale), data
 
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 from rigwatch.physics.engine.fit import Fit, Recording
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.data import Data, predicts_along_motion, quiet_scale, with_next_rows
+from rigwatch.workbench.data import Data, predicts_along_motion, scale_of_several, with_next_rows
 from rigwatch.workbench.fit import Fitted, fit_base, fit_model
 from rigwatch.workbench.ranking import difference
 from rigwatch.workbench.study import HEALTHY, RECORDINGS, Held, Study
@@ -37,7 +37,7 @@ def with_row_order(study: Study, data: Data) -> tuple[Study, Data]:
     if not names:
         return study, data
     own = data.of_healthy or data
-    scale = quiet_scale(own.train) if own.train.outputs.shape[1] > 1 else None
+    scale = scale_of_several(own.train)
     before = fit_base(study, own, scale)
     after = _fitted_with_next_rows(study, own, names, before, scale)
     if after is None or not _much_better(before, after):

@@ -14,6 +14,7 @@ from rigwatch.workbench.data.noise import (
     lowered,
     overstated,
     quiet_scale,
+    scale_of_several,
 )
 from rigwatch.workbench.data.one_rate import ALIKE as RATES_ALIKE
 from rigwatch.workbench.data.one_rate import RESAMPLED
@@ -64,6 +65,7 @@ __all__ = [
     "read_columns",
     "repeat_along_motion",
     "repeat_of",
+    "scale_of_several",
     "simulated_states",
     "unchanging",
     "with_elements",

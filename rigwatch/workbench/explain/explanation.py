@@ -1,6 +1,6 @@
 """What an explanation says: verdict, ranking with strengths, how often such verdicts were wrong."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from rigwatch.physics.engine.search import at_bound
@@ -135,8 +135,9 @@ def explanation(
     told += ends_of_range(bench)
     compared = comparison(bench)
     compared = replace(compared, remarks=[*compared.remarks, *told])
+    fitted = {row.label: row for row in rows if row.fitted is not None}
     listed = [
-        _row(row, members, more) if row is verdict.best else _row(row, _not_told_from(row, rows))
+        _row(row, members, more) if row is verdict.best else _row(row, _not_told_from(row, fitted))
         for row in rows
     ]
     unlike = "; ".join([*uncalibrated(bench), *_unlike_training(bench, verdict)])
@@ -232,11 +233,11 @@ def _reliability(bench: Bench, verdict: Verdict) -> tuple[float | None, tuple[in
     return verdict.probability_wrong, cases_seen(verdict.word, verdict.evidence)
 
 
-def _not_told_from(row: Ranked, rows: Sequence[Ranked]) -> list[str]:
+def _not_told_from(row: Ranked, fitted: Mapping[str, Ranked]) -> list[str]:
     """Labels of effects like one to first order, but for those whose fit leaves more, or less."""
-    fitted = {each.label: each for each in rows if each.fitted is not None}
-    known = set[str]() if row.fitted is None else fitted.keys() & set(row.alike)
-    return [each for each in row.alike if each not in known or _same_error(row, fitted[each])]
+    if row.fitted is None:
+        return row.alike
+    return [each for each in row.alike if each not in fitted or _same_error(row, fitted[each])]
 
 
 def _same_error(one: Ranked, other: Ranked) -> bool:

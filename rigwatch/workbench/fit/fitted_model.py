@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -293,18 +294,20 @@ def _of_free_run(  # noqa: PLR0917 -- they belong together
     it its size is found.
     """
     free_run = study.model.states and not data.along_motion
-    shorter = max(data.horizon // SHORTER, 1)
-    if free_run and (data.horizon >= LONG or from_short_horizons):
+
+    def begun_short() -> Fit:
+        shorter = max(data.horizon // SHORTER, 1)
         return over_all(start=fit_over(shorter, start=begin).parameters)
+
+    if free_run and (data.horizon >= LONG or from_short_horizons):
+        return begun_short()
     try:
         return over_all(start=begin)
-    except ModelError as ran_away:
-        if not free_run:
-            raise
-        try:
-            return over_all(start=fit_over(shorter, start=begin).parameters)
-        except ModelError:
-            raise ran_away from None
+    except ModelError:
+        if free_run:
+            with suppress(ModelError):
+                return begun_short()
+        raise
 
 
 def _in_windows(recording: Recording, horizon: int) -> list[Recording]:

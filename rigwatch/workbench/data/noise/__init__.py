@@ -9,6 +9,7 @@ from rigwatch.workbench.data.noise.noise_floor import (
     held_out_floor,
     lowered,
     quiet_scale,
+    scale_of_several,
 )
 from rigwatch.workbench.data.noise.stated import overstated
 
@@ -22,4 +23,5 @@ __all__ = [
     "lowered",
     "overstated",
     "quiet_scale",
+    "scale_of_several",
 ]

@@ -332,3 +332,8 @@ def quiet_scale(recording: Recording) -> FloatArray:
     )
     least: FloatArray = 1e-6 * np.where(sizes > 0, sizes, 1.0)
     return np.asarray(np.maximum(quiet, least), np.float64)
+
+
+def scale_of_several(recording: Recording) -> FloatArray | None:
+    """The noise of each channel as its weight, shape (outputs,); None if there is only one."""
+    return quiet_scale(recording) if recording.outputs.shape[1] > 1 else None

@@ -55,10 +55,11 @@ def _leaves_much(bench: Bench, verdict: Verdict) -> bool:
 
 def _of_the_other_sign(bench: Bench, rows: Sequence[Ranked]) -> Ranked | None:
     """The effect at a force port that explains most, if only its bounds are against it."""
+    above = bench.floor.of_training.above(bench.base.train)
+    if above < FAR:
+        return None
     allowed = {row.label for row in rows}
     every = rank_all(bench.study, bench.data, bench.base)
     found = [row for row in every if row.kind == "force" and row.label not in allowed]
     best = max(found, key=lambda row: row.explained, default=None)
-    above = bench.floor.of_training.above(bench.base.train)
-    suits = best is not None and above >= FAR and best.explained >= MOST * above
-    return best if suits else None
+    return best if best is not None and best.explained >= MOST * above else None
