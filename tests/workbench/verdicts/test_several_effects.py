@@ -64,7 +64,7 @@ def test_without_the_truth_among_them_no_effect_is_named_with_confidence(three):
 
 @pytest.mark.nightly
 def test_what_the_best_set_leaves_is_told_if_something_else_is_missing_too():
-    bench = hiding("coulomb", "quadratic_drag", "dead_band")
+    bench = hiding("coulomb", "cubic_stiffness", "dead_band")
     outside = {"dead_band", "saturation", "valve_hysteresis", "curvature", "asymmetry", "gain"}
     rest = {n: e for n, e in bench.study.effects.items() if n not in outside}
     _, verdict = ranking(
