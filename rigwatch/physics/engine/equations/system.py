@@ -18,6 +18,7 @@ from msgspec import structs
 from rigwatch.physics.engine.equations.effect import Effect
 from rigwatch.physics.engine.equations.expression import names_in
 from rigwatch.physics.engine.equations.model import PRESENT, Model, Parameter, Port, State
+from rigwatch.physics.engine.equations.own_port import solved
 from rigwatch.physics.engine.equations.quantities import hold_at, in_order, signals_at, spelt_out
 from rigwatch.physics.engine.equations.scope import Scope, symbol
 from rigwatch.wire.errors import ModelError
@@ -273,7 +274,7 @@ class _Composer:
         waiting = [name for kind in kinds for name, port in ports.items() if port.kind == kind]
         values = {}
         while waiting:
-            ready = (n for n in waiting if self._is_ready(ports[n], waiting))
+            ready = (n for n in waiting if self._is_ready(n, waiting))
             # Of those that are never ready the one in the wrong is told, not one that waits for it.
             circular = (n for n in waiting if self._needs_itself(n))
             name = next(chain(ready, circular, waiting))
@@ -281,27 +282,49 @@ class _Composer:
             waiting.remove(name)
         return values
 
-    def _is_ready(self, port: Port, waiting: list[str]) -> bool:
-        """Whether all that a port's signal and variables use is defined."""
-        texts = [own.expression for own in port.variables.values()]
-        names = {port.signal}.union(*(names_in(text, "variable") for text in texts))
-        return not names & {*self._waiting, *waiting}
+    def _is_ready(self, name: str, waiting: list[str]) -> bool:
+        """Whether all that a port's signal and variables use is defined, but for itself."""
+        behind = {self._model.ports[name].signal} & {*self._waiting}
+        return not behind and not self._in_variables(name) & {*waiting} - {name}
+
+    def _in_variables(self, name: str) -> frozenset[str]:
+        """Names that a port's variables use, quantities spelt out."""
+        texts = (own.expression for own in self._spelt_out.ports[name].variables.values())
+        return frozenset().union(*(names_in(text, f"port {name}: variable") for text in texts))
 
     def _needs_itself(self, name: str) -> bool:
-        """Whether a port's signal or variables use what enters there, also through quantities."""
+        """Whether a port's signal uses what enters there, also through quantities."""
         port, quantities = self._spelt_out.ports[name], self._spelt_out.quantities
-        texts = [own.expression for own in port.variables.values()]
-        texts += [quantities[port.signal].expression] if port.signal in quantities else []
-        return any(name in names_in(text, "variable") for text in texts)
+        text = quantities[port.signal].expression if port.signal in quantities else ""
+        return bool(text) and name in names_in(text, "signal")
 
     def _enter(self, name: str, port: Port) -> sympy.Expr:
         """A port with its effects, added to the scope."""
         probe = symbol(PROBE + name) if port.kind != "sensor" else sympy.Integer(0)
-        self._variables[name] = self._port_variables(name, port)
-        value = self._port_value(name, port) + self._present * probe
+        value = self._with_own(name, port) + self._present * probe
         self._scope.define(name, value, self._port_unit(name, port))
         self._join(self._known())
         return value
+
+    def _with_own(self, name: str, port: Port) -> sympy.Expr:
+        """A port with its effects, whose variables may contain what enters there."""
+        if port.kind == "sensor" or name not in self._in_variables(name):
+            self._variables[name] = self._port_variables(name, port)
+            return self._port_value(name, port)
+
+        def value(entering: sympy.Expr) -> sympy.Expr:
+            self._variables[name] = self._port_variables(name, port, entering)
+            return self._port_value(name, port)
+
+        own = solved(value, symbol(name))
+        if own is None:
+            return value(self._arriving(port))
+        value(own)
+        return own
+
+    def _arriving(self, port: Port) -> sympy.Expr:
+        """What enters at a port without effects."""
+        return sympy.Integer(0) if port.kind == "force" else self._scope.meanings[port.signal]
 
     def _port_unit(self, name: str, port: Port) -> str:
         if port.kind == "force":
@@ -320,11 +343,10 @@ class _Composer:
 
     def _port_value(self, name: str, port: Port) -> sympy.Expr:
         unit = self._port_unit(name, port)
-        signal = port.kind != "force"
-        value = self._scope.meanings[port.signal] if signal else sympy.Integer(0)
+        value, added = self._arriving(port), port.kind == "force"
         for placement in signal_order(self._placements, name):
             acting = self._effect_value(placement, port, value, unit)
-            value = self._where_present(value, acting if signal else value + acting)
+            value = self._where_present(value, value + acting if added else acting)
         return value
 
     def _where_present(self, without: sympy.Expr, acting: sympy.Expr) -> sympy.Expr:
@@ -393,17 +415,23 @@ class _Composer:
             scope.define(name, symbol(label), own.shown or own.unit)
         return scope
 
-    def _port_variables(self, name: str, port: Port) -> dict[str, sympy.Expr]:
-        """Variables that effects at a port may use, defined before the effects."""
-        found = {}
-        for key, own in port.variables.items():
+    def _port_variables(
+        self, name: str, port: Port, entering: sympy.Expr | None = None
+    ) -> dict[str, sympy.Expr]:
+        """Variables that effects at a port may use, where `entering` enters at the port itself."""
+        found, scope, variables = {}, self._scope, port.variables
+        later = {*self._waiting, *self._model.ports}
+        if entering is not None:
+            scope, variables = self._scope.copy(), self._spelt_out.ports[name].variables
+            scope.define(name, entering, self._port_unit(name, port))
+        for key, own in variables.items():
             where = f"port {name}: variable {key}"
-            for waiting in names_in(own.expression, where) & {name, *self._waiting}:
+            for waiting in (names_in(own.expression, where) - scope.meanings.keys()) & later:
                 raise ModelError(
                     f"{where}: found {waiting!r}, which depends on what enters at {name} or at a"
                     " port behind it, expected what does not"
                 )
-            found[key] = self._scope.read(own.expression, own.unit, where)
+            found[key] = scope.read(own.expression, own.unit, where)
         return found
 
     def _adopt(self, placement: Placement) -> None:
