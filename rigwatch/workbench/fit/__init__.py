@@ -3,6 +3,8 @@
 from rigwatch.workbench.fit.another_start import (
     begun_from_given,
     begun_from_larger,
+    begun_over_short_horizons,
+    given_values,
     only_noise_left,
 )
 from rigwatch.workbench.fit.fitted import Fitted, block_differences, error_text
@@ -61,6 +63,7 @@ __all__ = [
     "as_written",
     "begun_from_given",
     "begun_from_larger",
+    "begun_over_short_horizons",
     "block_differences",
     "block_numbers",
     "continued_train_error",
@@ -73,6 +76,7 @@ __all__ = [
     "fit_model",
     "fit_with_retry",
     "free_run",
+    "given_values",
     "held_as",
     "interval_with_held",
     "keeps_accepted",

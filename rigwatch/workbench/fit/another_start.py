@@ -39,9 +39,27 @@ def begun_from_given(study: Study, data: Data, found: Fitted) -> Fitted:
     Args:
         study, data, found: the study, its recordings, and a fit of its model with effects.
     """
-    own, given = study.model.parameters, study.file.start
-    start = found.train.values() | {name: given.get(name, p.value) for name, p in own.items()}
+    start = found.train.values() | given_values(study)
     return _better(study, data, found, start, "the given values")
+
+
+def begun_over_short_horizons(
+    study: Study, data: Data, found: Fitted, begin: Mapping[str, float]
+) -> Fitted:
+    """The better of a fit and one from the given values that begins over short horizons.
+
+    Args:
+        study, data, found: as in `begun_from_given`.
+        begin: initial values of the effect in question.
+    """
+    start = found.train.values() | given_values(study) | dict(begin)
+    return _better(study, data, found, start, "short horizons", from_short_horizons=True)
+
+
+def given_values(study: Study) -> dict[str, float]:
+    """The model's parameters as the study or the model's file give them."""
+    given = study.file.start
+    return {name: given.get(name, p.value) for name, p in study.model.parameters.items()}
 
 
 def begun_from_larger(study: Study, data: Data, found: Fitted, larger: Fitted) -> Fitted:
@@ -59,7 +77,13 @@ def begun_from_larger(study: Study, data: Data, found: Fitted, larger: Fitted) -
 
 
 def _better(
-    study: Study, data: Data, found: Fitted, start: Mapping[str, float], begun: str
+    study: Study,
+    data: Data,
+    found: Fitted,
+    start: Mapping[str, float],
+    begun: str,
+    *,
+    from_short_horizons: bool = False,
 ) -> Fitted:
     """A fit from another start if it leaves materially less of the training and no more held out.
 
@@ -68,7 +92,10 @@ def _better(
     if data.along_motion or study.model.rough:
         return found
     try:
-        again = fit_model(study, data, found.placements, start, found.train.scale)
+        again = fit_model(
+            study, data, found.placements, start, found.train.scale,
+            from_short_horizons=from_short_horizons,
+        )  # fmt: skip
     except ModelError:
         return found
     lower = again.train_error <= LOWER * found.train_error

@@ -1,7 +1,9 @@
 """Fits the model with an effect in it, and judges the fit on the recordings held out."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from rigwatch.physics.engine.compile import cores, side_by_side
@@ -12,8 +14,10 @@ from rigwatch.workbench.data import Data, NoiseFloor, lowered
 from rigwatch.workbench.fit import (
     Fitted,
     begun_from_given,
+    begun_over_short_horizons,
     fit_model,
     fit_with_retry,
+    given_values,
     may_be_local_minimum,
     only_noise_left,
     refit_from_short_horizons,
@@ -53,6 +57,12 @@ def refit(
                 continue
             if given.keys().isdisjoint(undetermined(fits[-1].train)):
                 break
+    if not fits and not data.along_motion:
+        # Where the base model ended need not be near the model with the effect.
+        start, placed = ended | given_values(study), (*base.placements, row.placement)
+        short = partial(fit_model, from_short_horizons=True)
+        with suppress(ModelError):
+            fits.append(short(study, data, placed, start, base.train.scale, base=base))
     if not fits:
         row.reason, row.failure = "cannot be fitted", failures[0]
         return
@@ -78,8 +88,8 @@ def _given_of_open(study: Study, data: Data, base: Fitted) -> dict[str, float]:
     """
     if base.convergence is None or data.along_motion:
         return {}
-    own, given = study.model.parameters, study.file.start
-    return {n: given.get(n, own[n].value) for n in base.convergence.undetermined if n in own}
+    given, open_ = given_values(study), base.convergence.undetermined
+    return {name: given[name] for name in open_ if name in given}
 
 
 def fit_started(known: Callable[[Study, Sequence[Placement]], Mapping[str, float]]) -> Fitting:
@@ -189,11 +199,23 @@ def refit_elsewhere(
         judge_fit(base, row)
 
 
-def refit_from_given(study: Study, data: Data, base: Fitted, row: Ranked) -> None:
-    """Begin a fitted row once more from the model's given values; the better fit is kept."""
+def refit_from_given(
+    study: Study, data: Data, base: Fitted, floor: NoiseFloor, row: Ranked
+) -> None:
+    """Begin a fitted row once more from the model's given values; the better fit is kept.
+
+    What still leaves more than noise begins over short horizons as well: the fewer periods of a
+    motion a window holds, the fewer local minima there are.
+    """
     assert row.fitted is not None
     row.begun_again = True
-    again = begun_from_given(study, data, row.fitted)
+    _keep_better(base, row, begun_from_given(study, data, row.fitted))
+    if not leaves_only_noise(study, data, floor, row):
+        _keep_better(base, row, begun_over_short_horizons(study, data, row.fitted, row.begin()))
+
+
+def _keep_better(base: Fitted, row: Ranked, again: Fitted) -> None:
+    """Judge a row anew if it was fitted better."""
     if again is not row.fitted:
         row.fitted = again
         judge_fit(base, row)

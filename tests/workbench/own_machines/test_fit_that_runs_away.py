@@ -3,9 +3,14 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
-from rigwatch.workbench.compare.preparation import open_bench
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.workbench.compare.preparation import Bench, open_bench
 from rigwatch.workbench.explain.explain import ranking
+from rigwatch.workbench.fit import begun_from_given
+from rigwatch.workbench.ranking import rank_only, refit, refit_from_given, shapes_of
+from rigwatch.workbench.ranking.refitting import fit_started
 from tests.workbench.machine import Table, studied
 from tests.workbench.simulated import with_few_effects
 
@@ -33,11 +38,27 @@ INERTIA, DAMPING, RIGHTING, SOFTER = 2.4, 0.5, 30.0, -11.0
 def rolled(seed: int, softer: float = SOFTER, drag: float = 0.0, seconds: float = 120.0) -> Table:
     """Roll angle and rate under a slow random moment, read with noise."""
     draw = np.random.default_rng(seed)
-    count = round(seconds * RATE)
-    fine = np.arange(count * SUBSTEPS) / (RATE * SUBSTEPS)
     tones = draw.uniform(0.2, 0.8, 6)
-    moment = np.sin(2 * np.pi * np.outer(fine, tones) + 40 * tones).sum(axis=1) * 1.2
-    angle = rate = 0.0
+    moment = np.sin(2 * np.pi * np.outer(_fine(seconds), tones) + 40 * tones).sum(axis=1) * 1.2
+    return _read(moment, softer, drag, draw)
+
+
+def swept(seed: int, begin: float) -> Table:
+    """The same under a moment that sweeps down through the resonance."""
+    fine = _fine(80.0)
+    moment = 1.4 * np.sin(2 * np.pi * (0.65 * fine - 0.1 * fine**2 / fine[-1]))
+    return _read(moment, -14.0, 0.0, np.random.default_rng(seed), begin)
+
+
+def _fine(seconds: float) -> FloatArray:
+    return np.arange(round(seconds * RATE) * SUBSTEPS) / (RATE * SUBSTEPS)
+
+
+def _read(
+    moment: FloatArray, softer: float, drag: float, draw: np.random.Generator, begin: float = 0.0
+) -> Table:
+    count = len(moment) // SUBSTEPS
+    angle, rate = begin, 0.0
     angles, rates = np.empty(count), np.empty(count)
     for n, push in enumerate(moment):
         if n % SUBSTEPS == 0:
@@ -55,8 +76,41 @@ def rolled(seed: int, softer: float = SOFTER, drag: float = 0.0, seconds: float 
     }
 
 
-def test_an_effect_whose_fit_runs_away_is_begun_over_short_horizons(tmp_path: Path) -> None:
+def _bench(folder: Path, model: str, train: Table, held_out: Table) -> Bench:
     units = {"moment": "N m", "roll": "rad", "rate": "rad/s"}
-    made = studied(tmp_path, SHIP, [rolled(4)], [rolled(6)], units, "horizon = 8.0", [RATE, RATE])
-    verdict = ranking(with_few_effects(open_bench(made)))[1]
+    made = studied(folder, model, [train], [held_out], units, "horizon = 8.0", [RATE, RATE])
+    return with_few_effects(open_bench(made))
+
+
+def _begun_at(inertia: float, damping: float, righting: float) -> str:
+    """The model's file with other starting values."""
+    model = SHIP.replace("I = { value = 12.0", f"I = {{ value = {inertia}")
+    model = model.replace("b = { value = 0.1", f"b = {{ value = {damping}")
+    return model.replace("G = { value = 93.0", f"G = {{ value = {righting}")
+
+
+def test_an_effect_whose_fit_runs_away_is_begun_over_short_horizons(tmp_path: Path) -> None:
+    verdict = ranking(_bench(tmp_path, SHIP, rolled(4), rolled(6)))[1]
     assert (verdict.word, verdict.members[0]) == ("missing_effect", "cubic_stiffness@hull")
+
+
+def test_where_the_base_ends_far_off_the_given_values_begin_the_fit(tmp_path: Path) -> None:
+    bench = _bench(tmp_path, _begun_at(0.8, 1.5, 19.0), swept(1, 0.3), swept(2, 0.2))
+    verdict = ranking(bench)[1]
+    assert bench.base.train.values()["I"] < 0.5 * INERTIA
+    assert (verdict.word, verdict.members[0]) == ("missing_effect", "cubic_stiffness@hull")
+
+
+def test_what_ends_in_a_local_minimum_begins_over_short_horizons(tmp_path: Path) -> None:
+    far = {"I": 10.0, "b": 1.0, "G": 223.0}
+    bench = _bench(tmp_path, _begun_at(*far.values()), swept(1, 0.3), swept(2, 0.2))
+    study, data, base = bench.study, bench.data, bench.base
+    row = rank_only(study, data, base, shapes_of(study, data.train, "cubic_stiffness", "hull"))
+    refit(study, data, base, row, fit_started(lambda *_: far | {"hull_cubic_stiffness_k3": -200.0}))
+    stuck = row.fitted
+    assert stuck is not None
+    assert begun_from_given(study, data, stuck) is stuck
+    refit_from_given(study, data, base, bench.floor, row)
+    assert row.fitted is not None
+    assert row.fitted.train_error < 0.1 * stuck.train_error
+    assert row.fitted.train.values()["I"] == pytest.approx(INERTIA, rel=0.05)
