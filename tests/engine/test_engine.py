@@ -265,3 +265,43 @@ def test_a_flow_that_has_ended_leaves_the_slopes_finite_and_right():
     read = at.outputs[0] + 0.01 * np.random.default_rng(0).normal(size=(400, 1))
     fitted = fit(compiled, Recording(0.02, u, read), horizon=400)
     assert fitted.values()["a"] == pytest.approx(0.8, rel=0.02)
+
+
+THROTTLED = """
+name = "throttled"
+summary = "a tank whose loss grows with the size of the net flow into it"
+inputs.u = { unit = "m/s" }
+states.h = { unit = "m", derivative = "u - a*sqrt(h + d) - LOSS", measured = "level" }
+parameters.a = { value = 0.5, unit = "m^0.5/s", low = 0.0 }
+parameters.b = { value = 0.3, unit = "s/m", low = 0.0 }
+parameters.d = { value = 0.5, unit = "m", fixed = true }
+parameters.w = { value = 0.1, unit = "m/s", fixed = true }
+outputs.level = { unit = "m", expression = "h" }
+"""
+NET = "(u - a*sqrt(h + d))"
+
+
+@pytest.mark.parametrize(
+    "loss",
+    [
+        pytest.param(f"b*{NET}*abs{NET}", id="a product"),
+        pytest.param(f"b*w*w*tanh(abs{NET}/w)", id="within a function"),
+        pytest.param(f"b*w*max(abs{NET} - w, 0)", id="of which a part counts"),
+    ],
+)
+def test_the_size_of_a_flow_through_a_root_has_slopes(loss):
+    text = THROTTLED.replace("LOSS", loss)
+    compiled = compile_system(compose(parse(text, Model, "throttled")))
+    u = 0.4 + 0.4 * np.sin(np.arange(300) * 0.05)[:, None]
+
+    def run(b: float):
+        return compiled.simulate(
+            u, 0.02, np.array([0]), 300, initial=np.ones((1, 1)),
+            parameters=compiled.vector({"b": b}),
+        )  # fmt: skip
+
+    step = 1e-5
+    found = (run(0.3 + step).outputs - run(0.3 - step).outputs)[0, :, 0] / (2 * step)
+    place = compiled.system.free.index("b")
+    # What a threshold passes has a corner, whose place a step moves.
+    assert np.abs(run(0.3).slopes[0, :, 0, place] - found).max() < 1e-3 * np.abs(found).max()

@@ -1,6 +1,6 @@
 """Units: one table of quantities with exact factors, and parsing of texts such as "kN/mm"."""
 
-from rigwatch.wire.units.spellings import in_table_words, may_count_turns
+from rigwatch.wire.units.spellings import as_meant, in_table_words, may_count_turns
 from rigwatch.wire.units.unit import (
     GRAM,
     NONE,
@@ -22,6 +22,7 @@ __all__ = [
     "Dimension",
     "Unit",
     "UnitError",
+    "as_meant",
     "describe",
     "in_table_words",
     "is_unit",

@@ -6,7 +6,7 @@ without a unit.
 
 import re
 
-from rigwatch.wire.units.unit import NONE, unit_of
+from rigwatch.wire.units.unit import NONE, is_unit, unit_of, with_gravity
 from rigwatch.wire.units.unit_table import BASES, ENTRIES, IN_OTHER_WORDS
 
 WHOLE = {
@@ -14,6 +14,8 @@ WHOLE = {
     "lb-ft": "ft lbf", "ft-lb": "ft lbf", "lb-in": "inch lbf", "in-lb": "inch lbf",
 }  # fmt: skip
 """Spellings of whole units, in lower case."""
+DEGREES = {"C": "degC", "F": "degF"}
+"""Temperatures as loggers abbreviate them, where nothing else would be one."""
 _WORD = re.compile(r"[A-Za-zµ°]+")
 _NEGATIVE = re.compile(r"(?<=[A-Za-z])[-−](?=\d)")
 _PRODUCT = re.compile(r"(?<=[A-Za-z])-(?=[A-Za-z])")
@@ -43,6 +45,16 @@ def _table_word(word: str) -> str:
     alike = [name for name in ENTRIES if name.lower() == lower]
     alike = [name for name in alike if name[0] == word[0]] or alike
     return alike[0] if len(alike) == 1 and len(word) >= _SHORTEST else word
+
+
+def as_meant(unit: str, wanted: str) -> str:
+    """A column's unit as it is meant for a quantity of the unit `wanted`; empty if it is another's.
+
+    An accelerometer's g is standard gravity, and C or F beside a temperature are degrees.
+    """
+    dimension = unit_of(wanted).dimension
+    readings = (unit, with_gravity(unit), DEGREES.get(unit, unit))
+    return next((r for r in readings if is_unit(r) and unit_of(r).dimension == dimension), "")
 
 
 def may_count_turns(one: str, other: str) -> bool:

@@ -22,7 +22,7 @@ JOINED = ("kg", "rad", "ohm", "Pa", "Hz", "N", "m", "s", "V", "A", "W", "K", "J"
 
 NONE: Dimension = (Fraction(0),) * len(BASES)
 """Of a pure number."""
-_GRAM = re.compile(r"(?<![A-Za-z])m?g(?![A-Za-z0-9])")
+_GRAM = re.compile(r"(?<![A-Za-z])(m?)g(?![A-Za-z0-9])")
 GRAM = "the unit g is the gram, write g0 for standard gravity"
 _POWER = r"-?\d+(?:\.\d+)?|\(-?\d+(?:\.\d+|/[1-9]\d?)?\)"
 _EXPONENT = rf"(?:(?:\^|\*\*)(?P<{{0}}>{_POWER}))?"
@@ -290,4 +290,4 @@ def names_gram(text: str) -> bool:
 
 def with_gravity(text: str) -> str:
     """A unit with standard gravity in place of the gram."""
-    return _GRAM.sub("g0", text)
+    return _GRAM.sub(r"\1g0", text)

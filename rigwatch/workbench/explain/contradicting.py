@@ -129,8 +129,8 @@ def not_refuted(
     """Labels of effects that resemble the residual more than the best does, and whose fits failed.
 
     An effect can vanish. A fit that leaves more of the training than there is without the effect
-    has ended in a local minimum and tells nothing of it: while the best leaves much, the score that
-    put the other before it is all that is known.
+    has ended in a local minimum and tells nothing of it, no more than one that diverged: while the
+    best leaves much, the score that put the other before it is all that is known.
     """
     assert best.fitted is not None
     if floor.reached(best.fitted.held_out) or explains(base, best, floor):
@@ -141,8 +141,7 @@ def not_refuted(
         for row in rows
         if _is_another(best, row)
         and row.explained > best.explained
-        and row.fitted is not None
-        and row.fitted.train_error > risen
+        and (row.unfittable or (row.fitted is not None and row.fitted.train_error > risen))
     )
 
 

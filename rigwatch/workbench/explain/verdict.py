@@ -176,7 +176,7 @@ def _doubt(
             leads += " of those as simple"
         return "undetermined", others, f"{leads}, but {', '.join(others)} explains {more}"
     if untold := not_refuted(base, best, rows, floor):
-        why = "resembles the residual more, and its fit ended in a local minimum"
+        why = "resembles the residual more, and its fit ended in a local minimum or failed"
         return "undetermined", untold, f"{leads}, but {', '.join(untold)} {why}"
     return None
 

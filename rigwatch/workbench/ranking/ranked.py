@@ -17,6 +17,10 @@ SIMILAR = 0.8
 """Cosine below which two effects explain different parts of the error."""
 
 
+UNFITTABLE = "cannot be fitted"
+"""Reason of a row whose fit was tried and failed."""
+
+
 @dataclass(eq=False)
 class Ranked:
     """One effect at one port.
@@ -81,6 +85,11 @@ class Ranked:
     def label(self) -> str:
         """Effect and port as "effect@port"."""
         return f"{self.effect}@{self.port}"
+
+    @property
+    def unfittable(self) -> bool:
+        """Whether its fit was tried and failed."""
+        return self.fitted is None and self.reason == UNFITTABLE
 
     def take(self, other: "Ranked") -> None:
         """Store the fit of another row of the same effect, and its decision."""

@@ -23,7 +23,7 @@ from rigwatch.workbench.fit import (
     refit_from_short_horizons,
 )
 from rigwatch.workbench.ranking.acceptance import EXPLAINED, judge_fit, leaves_nothing
-from rigwatch.workbench.ranking.ranked import SIMILAR, Ranked
+from rigwatch.workbench.ranking.ranked import SIMILAR, UNFITTABLE, Ranked
 from rigwatch.workbench.ranking.series_order import orders_at_port
 from rigwatch.workbench.study import Study
 
@@ -64,7 +64,7 @@ def refit(
         with suppress(ModelError):
             fits.append(short(study, data, placed, start, base.train.scale, base=base))
     if not fits:
-        row.reason, row.failure = "cannot be fitted", failures[0]
+        row.reason, row.failure = UNFITTABLE, failures[0]
         return
     row.fitted, row.failure = min(fits, key=lambda fitted: fitted.train_error), ""
     judge_fit(base, row)

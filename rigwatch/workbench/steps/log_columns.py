@@ -9,7 +9,7 @@ from fractions import Fraction
 from rigwatch.physics.engine.equations import Input, Model, Output
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.texts import Header, read_header
-from rigwatch.wire.units import is_unit, may_count_turns, unit_of
+from rigwatch.wire.units import as_meant, is_unit, may_count_turns, unit_of
 
 TIMES = ("time", "t", "timestamp", "time_stamp", "seconds", "sec")
 """Names of a time column."""
@@ -31,6 +31,7 @@ SET_VALUES = frozenset(
 )
 """Words in the name of a column that has a set value, which no sensor has read."""
 PER_MINUTE = Fraction(1, 60)
+AS_READ = {"g0": "standard gravity (g0)", "mg0": "thousandths of standard gravity (mg0)"}
 IN_CELSIUS = "; for degrees Celsius give --map '{channel}={column}[degC]'"
 _GIVEN_UNIT = re.compile(r"\[\s*([^\[\]]*?)\s*\]\s*$")
 
@@ -79,7 +80,7 @@ def matched(
     free = [h for h in headers if h is not time and not when.startswith(h.column)]
     signals: dict[str, Input | Output] = {**model.inputs, **model.outputs}
     found, missing, remarks = _read(signals, given, headers, free)
-    rates = _derived(model, missing, columns)
+    rates = _derived(model, missing, columns, [h for h in free if not _is_given(h, given)])
     if time is not None:
         when, more = _as_time(time, dated)
         remarks += more
@@ -137,8 +138,13 @@ def _read(
     return found, missing, remarks
 
 
+def _is_given(header: Header, given: Mapping[str, str]) -> bool:
+    """Whether the user maps a channel to a column, whatever is done with it."""
+    return any(source.strip().startswith(header.column) for source in given.values())
+
+
 def _derived(
-    model: Model, missing: Sequence[str], columns: Sequence[str]
+    model: Model, missing: Sequence[str], columns: Sequence[str], free: Sequence[Header]
 ) -> dict[str, tuple[str, int]]:
     """The source channel and the number of differentiations of each signal without a column.
 
@@ -146,7 +152,7 @@ def _derived(
         ModelError: a signal is the rate of no channel, or may be that of several.
     """
     signals: dict[str, Input | Output] = {**model.inputs, **model.outputs}
-    rates = dict[str, tuple[str, int]]()
+    rates, unknown = dict[str, tuple[str, int]](), list[tuple[str, str]]()
     for name in missing:
         # What drives a machine, as a set value, does not tell how the machine has moved.
         sides = (model.inputs, model.outputs) if name in model.inputs else (model.outputs,)
@@ -154,9 +160,16 @@ def _derived(
         made = _nearest_named(name, next(filter(None, found), []))
         channel = signals[name].channel or name
         if len(made) != 1:
-            told = [source for source, _ in made]
-            raise ModelError(_unknown(name, channel, signals[name], columns, told))
+            sources = [source for source, _ in made]
+            unknown.append(_unknown(name, channel, signals[name], free, sources))
+            continue
         (rates[channel],) = made
+    if unknown:
+        named = " and ".join(told for told, _ in unknown)
+        options = " ".join(option for _, option in unknown)
+        raise ModelError(
+            f"found no unique column for {named} among {', '.join(columns)}; expected {options}"
+        )
     return rates
 
 
@@ -211,7 +224,7 @@ def _chosen(
         free: columns that no signal has yet; the ones taken are removed.
     """
     missing = list(signals)
-    for choose in (_named, _measured):
+    for choose in (_named, _akin, _measured):
         for name in tuple(missing):
             signal = signals[name]
             if column := choose(name, signal, free):
@@ -228,6 +241,19 @@ def _named(name: str, signal: Input | Output, headers: Sequence[Header]) -> Head
     suiting = [header for header in suiting if not _is_set_value(header, signal)]
     alike = [h for h in suiting if any(_within(word, h.name) for word in wanted)]
     return next((chosen[0] for chosen in (named, alike) if len(chosen) == 1), None)
+
+
+def _akin(name: str, signal: Input | Output, headers: Sequence[Header]) -> Header | None:
+    """The column with a matching unit that shares most words with a signal's name."""
+    words = {word for word in name.lower().split("_") if len(word) > 1}
+    shared = {
+        header: len(words & set(header.name.split("_")))
+        for header in headers
+        if header.units and _fits(header, signal) and not _is_set_value(header, signal)
+    }
+    most = max(shared.values(), default=0)
+    chosen = [header for header, count in shared.items() if count == most]
+    return chosen[0] if most and len(chosen) == 1 else None
 
 
 def _measured(_name: str, signal: Input | Output, headers: Sequence[Header]) -> Header | None:
@@ -253,8 +279,7 @@ def _within(word: str, name: str) -> bool:
 
 
 def _fits(header: Header, signal: Input | Output) -> bool:
-    wanted = unit_of(signal.shown or signal.unit).dimension
-    return any(unit_of(unit).dimension == wanted for unit in header.units)
+    return any(as_meant(unit, signal.shown or signal.unit) for unit in header.units)
 
 
 def _unit(header: Header, channel: str, signal: Input | Output) -> tuple[str, list[str]]:
@@ -263,13 +288,20 @@ def _unit(header: Header, channel: str, signal: Input | Output) -> tuple[str, li
     Also a remark if it is assumed.
 
     Raises:
-        ModelError: the header has brackets with something else, or a rate where an angle matters.
+        ModelError: the header has brackets with something else, a unit of another quantity, or a
+            rate where an angle matters.
     """
     wanted = signal.shown or signal.unit
-    dimension = unit_of(wanted).dimension
-    unit = next((u for u in header.units if unit_of(u).dimension == dimension), "")
+    written = next((u for u in header.units if as_meant(u, wanted)), "")
+    unit = as_meant(written, wanted) if written else ""
     if not unit and header.unknown and wanted not in ("", "1"):
         raise ModelError(_no_unit(header, f"--map '{channel}={header.column}[{wanted}]'"))
+    if not unit and header.units:
+        raise ModelError(
+            f"{header.column}: found the unit {header.units[0]} in the header for {channel}"
+            f" [{wanted}], expected a unit of the same quantity; where the header is wrong, give"
+            f" --map '{channel}={header.column}[{wanted}]'"
+        )
     if not unit:
         return wanted, [
             f"{header.column}: no unit in its header, assumed {wanted}"
@@ -282,7 +314,8 @@ def _unit(header: Header, channel: str, signal: Input | Output) -> tuple[str, li
             f"{header.column}: found the unit {unit} for {channel} [{wanted}], which may count"
             f" turns or angles; expected --map '{channel}={header.column}[rev/s]' or '…[rad/s]'"
         )
-    return unit, []
+    told = f"{header.column}: {written} is read as {AS_READ.get(unit, unit)}"
+    return unit, [told] if unit != written else []
 
 
 def _as_turns(unit: str, wanted: str) -> str:
@@ -341,21 +374,17 @@ def _unknown(
     name: str,
     channel: str,
     signal: Input | Output,
-    columns: Sequence[str],
+    free: Sequence[Header],
     sources: Sequence[str] = (),
-) -> str:
-    """That no column is a signal's, and what to do.
+) -> tuple[str, str]:
+    """A signal that no column is known to be, and the option that names one.
 
     Args:
         name, channel, signal: the signal.
-        columns: of the log.
+        free: columns that are no other signal's.
         sources: channels of which it may be the rate, if there are several.
     """
-    suiting = [c for c in columns if (h := read_header(c)).units and _fits(h, signal)]
     unit = signal.shown or signal.unit
-    options = [f"--map '{channel}={column}'" for column in suiting]
+    options = [f"--map '{channel}={each.column}'" for each in free if _fits(each, signal)]
     rate = f", which may be the rate of {' or '.join(sources)}" if sources else ""
-    return (
-        f"found no unique column for {name} [{unit}]{rate} among {', '.join(columns)};"
-        f" expected {' or '.join(options) or f'--map {channel}=COLUMN[{unit}]'}"
-    )
+    return f"{name} [{unit}]{rate}", " or ".join(options) or f"--map {channel}=COLUMN[{unit}]"

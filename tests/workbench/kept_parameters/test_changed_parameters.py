@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from rigwatch.workbench.compare import shared_bench
 from rigwatch.workbench.explain.changed_parameters import undetermined_if_parameters_changed
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.ranking import no_progress
@@ -71,3 +72,19 @@ def test_an_effect_that_leaves_nothing_is_named(
 
     assert verdict.word == "missing_effect", verdict.text
     assert rows[0].label == label
+
+
+@pytest.mark.parametrize(
+    ("hidden", "word"),
+    [(Hidden(weaker=0.05), "missing_effect"), (Hidden(weaker=0.05, slower=0.01), "undetermined")],
+    ids=["weaker", "weaker and a little slower"],
+)
+def test_beside_shared_parameters_little_that_is_left_is_asked_of_changed_ones(
+    tmp_path: Path, hidden: Hidden, word: str
+) -> None:
+    shared = shared_bench(with_few_effects(bench(tmp_path, hidden, DRIVEN)))
+    assert shared is not None
+    rows, verdict = ranking(shared)
+
+    assert rows[0].label == "gain@drive"
+    assert verdict.word == word, verdict.text

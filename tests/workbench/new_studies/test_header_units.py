@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from rigwatch.commands import main
-from rigwatch.physics.engine.equations.model import shipped_models
+from rigwatch.physics.engine.equations.model import Model, shipped_models
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.typed_files.loading import parse
 from rigwatch.workbench.data.signals import prepare
 from rigwatch.workbench.steps.log_columns import matched
 from rigwatch.workbench.study.ledger import append
@@ -128,3 +129,75 @@ def test_of_two_columns_that_suit_the_options_are_told_with_their_own_units():
     columns = ["time [s]", "Air [degC]", "Base [degF]", "Power [W]", "Block temperature [degC]"]
     with pytest.raises(ModelError, match=r"--map 'ambient=Air \[degC\]' or --map 'ambient=Base"):
         matched(columns, BLOCK, {})
+
+
+BEAM = parse(
+    """
+name = "beam"
+summary = "A beam on a shaker."
+inputs.force = { unit = "N" }
+parameters.m = { value = 1.0, unit = "kg" }
+parameters.k = { value = 100.0, unit = "N/m" }
+states.x = { unit = "m", derivative = "v", start = 0.0 }
+states.v = { unit = "m/s", derivative = "(force - k*x)/m" }
+outputs.drive_point = { unit = "m/s^2", expression = "(force - k*x)/m" }
+outputs.tip_point = { unit = "m/s^2", expression = "2*(force - k*x)/m" }
+""",
+    Model,
+    "beam.toml",
+)
+BEAM_LOG = ["Time (s)", "force_N", "acc drive [m/s^2]", "acc tip [g]"]
+
+
+@pytest.mark.parametrize("given", [{}, {"tip_point": "acc tip [g]"}])
+def test_an_accelerometers_g_is_standard_gravity(given):
+    found = matched(BEAM_LOG, BEAM, given)
+
+    assert found.channels["tip_point"] == "acc tip [g][g0]"
+    assert found.channels["drive_point"] == "acc drive [m/s^2][m/s^2]"
+    assert "acc tip [g]: g is read as standard gravity (g0)" in found.remarks
+
+
+def test_a_g_of_a_mass_is_a_gram():
+    scale = parse(
+        """
+name = "scale"
+summary = "A tank on a scale."
+inputs.inflow = { unit = "kg/s" }
+parameters.k = { value = 1.0, unit = "1" }
+states.mass = { unit = "kg", derivative = "k*inflow", measured = "weight" }
+outputs.weight = { unit = "kg", expression = "mass" }
+""",
+        Model,
+        "scale.toml",
+    )
+    found = matched(["t [s]", "inflow [g/s]", "weight_g"], scale, {}).channels
+
+    assert found == {"inflow": "inflow [g/s][g/s]", "weight": "weight_g[g]"}
+
+
+def test_c_beside_a_temperature_is_degrees():
+    found = matched(["time [s]", "ambient_C", "Power [W]", "temperature_C"], BLOCK, {})
+
+    assert found.channels["ambient"] == "ambient_C[degC]"
+    assert found.channels["temperature"] == "temperature_C[degC]"
+    assert "ambient_C: C is read as degC" in found.remarks
+
+
+def test_a_header_of_another_quantity_is_refused():
+    with pytest.raises(ModelError, match=r"force_N: found the unit N in the header for tip_point"):
+        matched(BEAM_LOG, BEAM, {"tip_point": "force_N"})
+
+
+def test_all_signals_without_a_column_are_told_at_once():
+    with pytest.raises(ModelError) as error:
+        matched(["time [s]", "Power [W]", "one [bar]", "other [bar]"], BLOCK, {})
+
+    assert "for ambient [K] and temperature [K] among" in str(error.value)
+    assert str(error.value).endswith("--map ambient=COLUMN[K] --map temperature=COLUMN[K]")
+
+
+def test_a_column_of_another_signal_is_not_offered():
+    columns = ["Time (s)", "force_N", "drive_point [m/s^2]", "tip [mm]"]
+    with pytest.raises(ModelError, match=r"--map tip_point=COLUMN\[m/s\^2\]$"):
+        matched(columns, BEAM, {})

@@ -28,6 +28,7 @@ from rigwatch.workbench.explain.verdict import Verdict, judge, not_converged
 from rigwatch.workbench.explain.verdict_calibration import CLEAR, probability_wrong
 from rigwatch.workbench.fit import Fitted
 from rigwatch.workbench.ranking import Ranked
+from rigwatch.workbench.ranking.ranked import UNFITTABLE
 
 WINDOWS = 40
 TURNS = np.where(np.arange(WINDOWS) % 2, 1.0, -1.0)
@@ -432,6 +433,16 @@ def test_an_effect_whose_fit_failed_is_not_refuted_while_much_is_left(
     assert found.word == word
     assert found.rivals == (("b@x",) if word == "undetermined" else ())
     assert ("its fit ended in a local minimum" in found.text) is (word == "undetermined")
+
+
+@pytest.mark.parametrize(("explained", "word"), [(0.6, "undetermined"), (0.4, "missing_effect")])
+def test_an_effect_that_cannot_be_fitted_is_not_refuted_while_much_is_left(
+    explained: float, word: str
+) -> None:
+    only = trained(best(error=1.6, cosines={"b@x": 0.3}), 1.8)
+    failed = row("b@x", 4.0, accepted=False)
+    failed.fitted, failed.reason, failed.explained = None, UNFITTABLE, explained
+    assert judge(replace(base(), train=base(2.9).train), [only, failed], QUIET).word == word
 
 
 def test_what_hardly_lowers_the_training_error_is_not_named_with_confidence() -> None:

@@ -62,7 +62,28 @@ def derivative(expression: sympy.Expr, by: sympy.Symbol) -> sympy.Expr:
         factors = expression.args
         moved = ((i, derivative(factor, by)) for i, factor in enumerate(factors))
         return sympy.Add(*(sympy.Mul(*factors[:i], d, *factors[i + 1 :]) for i, d in moved if d))
-    return _by_rules(expression, by)
+    return (
+        _by_chain(expression, by) if _has_doubtful_size(expression) else _by_rules(expression, by)
+    )
+
+
+def _has_doubtful_size(expression: sympy.Expr) -> bool:
+    """Whether SymPy takes the size of something for that of a complex number, as of a root."""
+    return any(not size.args[0].is_extended_real for size in expression.atoms(sympy.Abs))
+
+
+def _by_chain(expression: sympy.Expr, by: sympy.Symbol) -> sympy.Expr:
+    """The derivative by the chain rule, each argument taken as the real number that it is."""
+    if isinstance(expression, sympy.Piecewise):
+        return sympy.Piecewise(*((derivative(e, by), where) for e, where in expression.args))
+    arguments = [sympy.Dummy(real=True) if by in a.free_symbols else a for a in expression.args]
+    outer = expression.func(*arguments)
+    back = dict(zip(arguments, expression.args, strict=True))
+    return sympy.Add(*(
+        _by_rules(outer, own).xreplace(back) * derivative(argument, by)
+        for own, argument in back.items()
+        if own != argument
+    ))  # fmt: skip
 
 
 def _by_rules(expression: sympy.Expr, by: sympy.Symbol) -> sympy.Expr:
