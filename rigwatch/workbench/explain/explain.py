@@ -1,5 +1,6 @@
 """Ranks the effects that may be missing, gives a verdict and proposes the next experiment."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from msgspec import structs
@@ -60,6 +61,7 @@ from rigwatch.workbench.ranking import (
     Progress,
     Ranked,
     in_order,
+    leaves_only_noise,
     no_progress,
     own_floor,
     rank,
@@ -76,6 +78,7 @@ BY_CHANCE = 0.05
 """Probability below which a rarer effect's score is more than chance."""
 HALF = 0.5
 """Share of an effect's error above noise that a rarer one in its place may leave."""
+BASE_NOT_CONVERGED = "{why}, but with the effect only noise is left"
 SECOND_PASS = "the effect was found in a second pass"
 TWO_BEYOND_BASE = "two effects at once on a base that was searched for are not told from others"
 
@@ -407,14 +410,51 @@ def _ranked(
 ) -> tuple[Bench, list[Ranked], Verdict]:
     """The study with its hold decided, its ranking, and the verdict; `rows` if it is ranked."""
     stopped = _stopped(bench)
-    if stopped is not None:
-        rows = rank_all(bench.study, bench.data, bench.base)
-        return bench, rows, with_base_offered(bench, stopped)
+    if stopped is None:
+        return _ranked_on(bench, progress, rows)
+    if _may_lack_an_effect(bench):
+        found = _ranked_on(bench, progress, rows)
+        if _leaves_only_noise(*found):
+            return _with_base_told(found, stopped)
+    rows = rank_all(bench.study, bench.data, bench.base)
+    return bench, rows, with_base_offered(bench, stopped)
+
+
+def _ranked_on(
+    bench: Bench, progress: Progress, rows: list[Ranked] | None
+) -> tuple[Bench, list[Ranked], Verdict]:
+    """`_ranked`, whether or not the model is fit to judge effects."""
     bench, rows = _beside_best_base(bench, progress, rows)
     decided = with_hold_decided(bench, rows, progress)
     bench, rows = decided.bench, decided.rows
     found, verdict = _judged(with_lower_floor(bench, rows), rows, progress)
     return bench, found, _with_rival_hold(decided, verdict)
+
+
+def _may_lack_an_effect(bench: Bench) -> bool:
+    """Whether a free run's starts do not agree, as they may where an effect is missing."""
+    ended, free_run = (
+        bench.base.convergence,
+        not (bench.data.along_motion or bench.study.model.rough),
+    )
+    return free_run and ended is not None and not ended.converged and not reversed_channel(bench)
+
+
+def _leaves_only_noise(bench: Bench, _rows: Sequence[Ranked], found: Verdict) -> bool:
+    """Whether the effect named leaves only noise: nothing else could describe the logs better."""
+    best = found.best
+    if found.word != "missing_effect" or found.beside or best is None or best.fitted is None:
+        return False
+    return leaves_only_noise(bench.study, bench.data, bench.floor, best)
+
+
+def _with_base_told(
+    found: tuple[Bench, list[Ranked], Verdict], stopped: Verdict
+) -> tuple[Bench, list[Ranked], Verdict]:
+    """What was found, with how the model without it was fitted."""
+    bench, rows, verdict = found
+    told = BASE_NOT_CONVERGED.format(why=stopped.text.partition(";")[0])
+    return bench, rows, replace(verdict, text=f"{verdict.text}; {told}")
 
 
 def _beside_best_base(

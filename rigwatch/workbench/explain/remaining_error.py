@@ -84,6 +84,8 @@ def remaining_error(base: Fitted, row: Ranked, floor: NoiseFloor) -> str:
     if train > held_out:
         share, of, fitted, floor = train, "training error", row.fitted.train, floor.of_training
     times = floor.times(fitted)
+    if share > 1.0:
+        return f"; it raises the {of} to {times:.2g} times the noise floor"
     if share:
         return f"; {share:.0%} of the {of}'s energy remains, {times:.2g} times the noise floor"
     above = floor.own_error is None and floor.ratio(fitted) > NEAR

@@ -7,6 +7,7 @@ full. An effect is accepted only if the held-out error falls, over blocks, by mo
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from rigwatch.workbench.data import Data, NoiseFloor
 from rigwatch.workbench.fit import Fitted, fit_model, fit_with_retry
@@ -84,6 +85,7 @@ def rank(
         refit(study, data, base, similar, fit_model if enough else fit_with_retry)
     if free_run:
         _begin_again(study, data, base, rows, floor, progress)
+        _begin_from_best(study, data, base, rows, floor, progress)
     for other in _elsewhere(study, data, rows, floor):
         progress(f"fitting {other.label}, as the best may act there")
         refit(study, data, base, other, fit_from(in_order(rows)[0].fitted))
@@ -117,6 +119,32 @@ def _begin_again(  # noqa: PLR0917 -- they belong together
         if not row.begun_again:
             progress(f"fitting {row.label} again, starting from the given values")
             refit_from_given(study, data, base, floor, row)
+
+
+def _begin_from_best(  # noqa: PLR0917 -- they belong together
+    study: Study,
+    data: Data,
+    base: Fitted,
+    rows: Sequence[Ranked],
+    floor: NoiseFloor,
+    progress: Progress,
+) -> None:
+    """Begin rows that ended above the base model where the best one has the model's parameters.
+
+    The base model's may be far off while an effect is missing, and only some that resemble it come
+    back from there: sliding with presliding, say, and not dry friction itself.
+    """
+    astray = [row for row in rows if row.likely and row.fitted is not None]
+    astray = [row for row in astray if row.fitted and row.fitted.train_error > base.train_error]
+    for row in astray[:BEGUN_AGAIN]:
+        best = in_order(rows)[0]
+        if best.fitted is None or leaves_only_noise(study, data, floor, best):
+            return
+        progress(f"fitting {row.label} again, starting from the parameters beside {best.label}")
+        begun = replace(row)
+        refit(study, data, base, begun, fit_from(best.fitted))
+        if begun.fitted and row.fitted and begun.fitted.train_error < row.fitted.train_error:
+            row.take(begun)
 
 
 def _fit_skipped(  # noqa: PLR0917 -- they belong together

@@ -12,6 +12,7 @@ from rigwatch.workbench.compare import locate, open_bench
 from rigwatch.workbench.explain import ranking
 from rigwatch.workbench.fit import each_recording
 from tests.workbench.machine import Table, studied
+from tests.workbench.simulated import knowing
 
 BLOCK = """
 name = "block"
@@ -44,7 +45,7 @@ def said(folder: Path, logs: list[Table]) -> str:
     bench = open_bench(studied(folder, BLOCK, logs[:-1], logs[-1:], UNITS, "horizon = 4.0",
                                rates=[1 / DT] * len(logs)))  # fmt: skip
     failed = replace(bench, base=replace(bench.base, convergence=NOT_CONVERGED))
-    verdict = ranking(failed)[1]
+    verdict = ranking(replace(failed, study=knowing(failed.study)))[1]
     assert verdict.word == "model_inadequate"
     assert verdict.text.startswith("the fit of the model did not converge: stuck; ")
     assert "; `rigwatch locate " in verdict.text

@@ -1,5 +1,6 @@
 """A spring that softens: begun too soft, the motion runs away within a window of the fit."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,15 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare.preparation import Bench, open_bench
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.fit import begun_from_given
-from rigwatch.workbench.ranking import rank_only, refit, refit_from_given, shapes_of
+from rigwatch.workbench.ranking import (
+    Ranked,
+    no_progress,
+    rank_only,
+    refit,
+    refit_from_given,
+    shapes_of,
+)
+from rigwatch.workbench.ranking.rank import _begin_from_best
 from rigwatch.workbench.ranking.refitting import fit_started
 from tests.workbench.machine import Table, studied
 from tests.workbench.simulated import with_few_effects
@@ -76,10 +85,10 @@ def _read(
     }
 
 
-def _bench(folder: Path, model: str, train: Table, held_out: Table) -> Bench:
+def _bench(folder: Path, model: str, train: Table, held_out: Table, *more: str) -> Bench:
     units = {"moment": "N m", "roll": "rad", "rate": "rad/s"}
     made = studied(folder, model, [train], [held_out], units, "horizon = 8.0", [RATE, RATE])
-    return with_few_effects(open_bench(made))
+    return with_few_effects(open_bench(made), *more)
 
 
 def _begun_at(inertia: float, damping: float, righting: float) -> str:
@@ -114,3 +123,51 @@ def test_what_ends_in_a_local_minimum_begins_over_short_horizons(tmp_path: Path)
     assert row.fitted is not None
     assert row.fitted.train_error < 0.1 * stuck.train_error
     assert row.fitted.train.values()["I"] == pytest.approx(INERTIA, rel=0.05)
+
+
+def test_what_ended_above_the_base_begins_from_the_best_ones_parameters(tmp_path: Path) -> None:
+    far = {"I": 10.0, "b": 1.0, "G": 223.0}
+    bench = _bench(tmp_path, _begun_at(*far.values()), swept(1, 0.3), swept(2, 0.2), "hard_stop")
+    study, data, base = bench.study, bench.data, bench.base
+
+    def row(effect: str, **strength: float) -> Ranked:
+        made = rank_only(study, data, base, shapes_of(study, data.train, effect, "hull"))
+        refit(study, data, base, made, fit_started(lambda *_: far | strength))
+        return made
+
+    best, stuck = row("hard_stop"), row("cubic_stiffness", hull_cubic_stiffness_k3=-200.0)
+    stuck.likely = True
+    refit_from_given(study, data, base, bench.floor, best)
+    assert stuck.fitted is not None
+    assert stuck.fitted.train_error > base.train_error > (best.fitted or base).train_error
+    _begin_from_best(study, data, base, [best, stuck], bench.floor, no_progress)
+    assert stuck.fitted.train_error < 0.1 * base.train_error
+
+
+def _of_starts_that_do_not_agree(bench: Bench) -> Bench:
+    ended = bench.base.convergence
+    assert ended is not None
+    apart = replace(ended, converged=False, reason="none of 7 starts leads where another does")
+    return replace(bench, base=replace(bench.base, convergence=apart))
+
+
+def test_an_effect_that_leaves_only_noise_is_named_where_fits_without_it_do_not_agree(
+    tmp_path: Path,
+) -> None:
+    bench = _bench(tmp_path, _begun_at(2.0, 0.3, 25.0), swept(1, 0.3), swept(2, 0.2))
+    _, verdict = ranking(_of_starts_that_do_not_agree(bench))
+    assert (verdict.word, verdict.members[0]) == ("missing_effect", "cubic_stiffness@hull")
+    assert verdict.text.endswith(
+        "the fit of the model did not converge: none of 7 starts leads where another does, but"
+        " with the effect only noise is left"
+    )
+
+
+def test_where_no_effect_leaves_only_noise_fits_that_do_not_agree_are_no_basis(
+    tmp_path: Path,
+) -> None:
+    bench = _bench(tmp_path, _begun_at(2.0, 0.3, 25.0), swept(1, 0.3), swept(2, 0.2))
+    known = {name: e for name, e in bench.study.effects.items() if name != "cubic_stiffness"}
+    poorer = replace(bench, study=replace(bench.study, effects=known))
+    _, verdict = ranking(_of_starts_that_do_not_agree(poorer))
+    assert verdict.word == "model_inadequate"

@@ -36,6 +36,8 @@ FEW = 0.005
 """Share of the samples that are few; of white noise they hold 5 % of the energy."""
 HALF = 0.5
 """Share of the error's energy in so few samples at which the others do not count."""
+ASTRAY = "the fit of the model without the effect did not converge"
+"""Why no simulated case is similar where the model's fits do not agree."""
 SHORT = 1000
 """Held-out samples below which no simulated case is similar: those have 5120."""
 
@@ -141,7 +143,9 @@ def uncalibrated(bench: Bench) -> list[str]:
     count = int(np.isfinite(bench.data.held_out.outputs).any(axis=1).sum())
     short = [f"only {count} held-out samples count"] if count < SHORT else []
     counted = not (bench.data.along_motion or bench.study.file.effects)
-    return [*([] if counted else bench.data.altered), *short]
+    ended = bench.base.convergence
+    astray = [] if ended is None or ended.converged else [ASTRAY]
+    return [*([] if counted else bench.data.altered), *astray, *short]
 
 
 def with_base_offered(bench: Bench, found: Verdict) -> Verdict:
