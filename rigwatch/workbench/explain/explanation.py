@@ -12,6 +12,7 @@ from rigwatch.workbench.explain.remaining_error import remaining_share, shows_li
 from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.explain.verdict_calibration import (
     LATER_COUNTS,
+    LEFT_EDGES,
     cases_seen,
     cases_seen_along,
     cases_seen_logged,
@@ -140,7 +141,10 @@ def explanation(
         _row(row, members, more) if row is verdict.best else _row(row, _not_told_from(row, fitted))
         for row in rows
     ]
-    unlike = "; ".join([*uncalibrated(bench), *_unlike_training(bench, verdict)])
+    remains = _remains(bench, verdict)
+    unlike = "; ".join([
+        *uncalibrated(bench), *_unlike_training(bench, verdict), *unlike_logged(bench, remains)
+    ])  # fmt: skip
     probability, similar = _reliability(bench, verdict)
     most = None if unlike else most_probably_wrong(*similar)
     return Explanation(
@@ -157,7 +161,7 @@ def explanation(
         compared.unit,
         wrong_at_most=most,
         unlike=unlike,
-        remains=_remains(bench, verdict),
+        remains=remains,
         altered=list(bench.data.altered),
         on_bound=_on_bound(verdict),
     )
@@ -199,6 +203,16 @@ def _unlike_training(bench: Bench, verdict: Verdict) -> list[str]:
         return []
     share = remaining_share(bench.base, best, bench.floor)
     return [f"the held-out recordings show less than the training, which keeps {share:.0%}"]
+
+
+def unlike_logged(bench: Bench, remains: float) -> list[str]:
+    """That an effect leaves more than on simulated logs with lost rows or uneven times, in words.
+
+    They are counted by word alone, and what is named there leaves little.
+    """
+    counted = bench.data.altered and not (bench.data.along_motion or bench.study.file.effects)
+    much = counted and remains > LEFT_EDGES[-1]
+    return [f"{remains:.0%} of the error's energy remains"] if much else []
 
 
 def _remains(bench: Bench, verdict: Verdict) -> float:

@@ -9,6 +9,8 @@ import pytest
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.explain.adequacy import stopped_by_outliers, uncalibrated
+from rigwatch.workbench.explain.adequacy.adequate import ASTRAY
+from rigwatch.workbench.explain.explanation import unlike_logged
 from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.explain.verdict_calibration import (
     Evidence,
@@ -77,12 +79,19 @@ def test_nothing_is_missing_is_not_said_where_outliers_hold_the_error() -> None:
 
 def test_recordings_unlike_the_simulated_ones_are_told() -> None:
     def told(
-        samples: int, *altered: str, along_motion: bool = False, later: bool = False
+        samples: int,
+        *altered: str,
+        along_motion: bool = False,
+        later: bool = False,
+        remains: float = 0.0,
+        converged: bool = True,
     ) -> list[str]:
         held_out = SimpleNamespace(outputs=np.zeros((samples, 1)))
         data: Any = SimpleNamespace(held_out=held_out, altered=altered, along_motion=along_motion)
         study = SimpleNamespace(file=SimpleNamespace(effects=("one",) if later else ()))
-        return uncalibrated(cast("Bench", SimpleNamespace(data=data, study=study)))
+        base = SimpleNamespace(convergence=SimpleNamespace(converged=converged))
+        bench = cast("Bench", SimpleNamespace(data=data, study=study, base=base))
+        return [*uncalibrated(bench), *unlike_logged(bench, remains)]
 
     missing = "inputs are missing"
     assert told(5120) == []
@@ -91,6 +100,10 @@ def test_recordings_unlike_the_simulated_ones_are_told() -> None:
     assert told(5120, missing) == []
     assert told(5120, missing, along_motion=True) == [missing]
     assert told(5120, missing, later=True) == [missing]
+    # What is named on those leaves little.
+    assert told(5120, missing, remains=0.2) == ["20% of the error's energy remains"]
+    assert told(5120, remains=0.2) == []
+    assert told(5120, converged=False) == [ASTRAY]
 
 
 def left(residuals: FloatArray, healthy: FloatArray | None = None) -> Bench:
