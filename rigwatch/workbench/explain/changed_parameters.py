@@ -26,9 +26,9 @@ CERTAIN = 1e-3
 are shared with the healthy recording: the parameters, of which there are many, also explain a
 little of what the base leaves of the healthy rig.
 
-Lower supplies of three rigs that nobody here had built are leaks then, and changed parameters leave
-less by 3e-6 to 6e-6; places where friction binds, which are found so as well, leave far less than
-these.
+Lower supplies of three rigs that nobody here had built look like leaks beside shared parameters,
+and changed ones leave less with p of 3e-6 to 6e-6. Of places where friction binds they leave far
+more.
 """
 
 

@@ -433,11 +433,9 @@ def _ranked_on(
 
 def _may_lack_an_effect(bench: Bench) -> bool:
     """Whether a free run's starts do not agree, as they may where an effect is missing."""
-    ended, free_run = (
-        bench.base.convergence,
-        not (bench.data.along_motion or bench.study.model.rough),
-    )
-    return free_run and ended is not None and not ended.converged and not reversed_channel(bench)
+    if bench.data.along_motion or bench.study.model.rough or reversed_channel(bench) is not None:
+        return False
+    return not_converged({"the model": bench.base.convergence}) is not None
 
 
 def _leaves_only_noise(bench: Bench, _rows: Sequence[Ranked], found: Verdict) -> bool:

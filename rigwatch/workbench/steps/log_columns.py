@@ -140,7 +140,9 @@ def _read(
 
 def _is_given(header: Header, given: Mapping[str, str]) -> bool:
     """Whether the user maps a channel to a column, whatever is done with it."""
-    return any(source.strip().startswith(header.column) for source in given.values())
+    sources = (source.strip() for source in given.values())
+    begins = [source for source in sources if source.startswith(header.column)]
+    return any(not source[len(header.column) :][:1].isalnum() for source in begins)
 
 
 def _derived(

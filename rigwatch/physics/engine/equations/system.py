@@ -316,11 +316,11 @@ class _Composer:
             self._variables[name] = self._port_variables(name, port, entering)
             return self._port_value(name, port)
 
-        own = solved(value, symbol(name))
-        if own is None:
+        found = solved(value, symbol(name))
+        if found is None:
             return value(self._arriving(port))
-        value(own)
-        return own
+        value(found)  # What effects there remember follows what enters with them.
+        return found
 
     def _arriving(self, port: Port) -> sympy.Expr:
         """What enters at a port without effects."""

@@ -36,8 +36,8 @@ FEW = 0.005
 """Share of the samples that are few; of white noise they hold 5 % of the energy."""
 HALF = 0.5
 """Share of the error's energy in so few samples at which the others do not count."""
-ASTRAY = "the fit of the model without the effect did not converge"
-"""Why no simulated case is similar where the model's fits do not agree."""
+ASTRAY = "the fit of the model did not converge"
+"""Why no simulated case is similar to an effect that is named although the fits do not agree."""
 SHORT = 1000
 """Held-out samples below which no simulated case is similar: those have 5120."""
 
