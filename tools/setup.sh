@@ -58,7 +58,7 @@ progress() {
             count=$((count + 1))
             if [ $((count % 10)) = 0 ]; then echo "setup:   $count of $1 are here"; fi
             ;;
-        "Installing collected packages"*) echo "setup:   all are here and are being installed" ;;
+        "Installing collected packages"*) echo "setup:   all $1 are here and are being installed" ;;
         "setup failed") return 1 ;;
         esac
     done
@@ -67,7 +67,7 @@ progress() {
 purpose() {
     case "${1##*/}" in
     lock.txt) echo "to run rigwatch" ;;
-    build.txt) echo "to install rigwatch itself" ;;
+    build.txt) echo "more, to install rigwatch itself" ;;
     dev.txt) echo "to check rigwatch" ;;
     mutation.txt) echo "to check its tests" ;;
     *) echo "to compare rigwatch with" ;;

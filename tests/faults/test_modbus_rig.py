@@ -266,7 +266,13 @@ def away(rig: ModbusRig, gone: Callable[[], None], back: Callable[[], None], for
     return max(told_s / THREE_POLLS, back_s / BACK_WITHIN)
 
 
-@pytest.mark.parametrize("frozen_s", [0.5, 3.5], ids=["within the ring", "longer than the ring"])
+@pytest.mark.parametrize(
+    "frozen_s",
+    [
+        pytest.param(0.5, id="within the ring"),
+        pytest.param(3.5, id="longer than the ring", marks=pytest.mark.nightly),
+    ],
+)
 def test_24_a_server_that_hangs(rig: ModbusRig, frozen_s: float) -> None:
     def hang() -> float:
         first, since = rig.device.next_seq, len(rig.gaps)

@@ -102,6 +102,7 @@ def silent_line(place: Path) -> Iterator[None]:
         yield
 
 
+@pytest.mark.nightly
 def test_daq_and_monitor_of_a_device_that_is_switched_off_are_not_started_anew(
     config: Path, tmp_path: Path
 ) -> None:
@@ -120,6 +121,7 @@ def test_daq_and_monitor_of_a_device_that_is_switched_off_are_not_started_anew(
             assert max(b - a for a, b in itertools.pairwise(times)) < 0.5 * WATCHDOG_S
 
 
+@pytest.mark.nightly
 def test_a_daq_without_its_device_waits_and_is_not_restarted(config: Path, tmp_path: Path) -> None:
     systemd = Systemd(tmp_path / "notify")
     with ExitStack() as held:

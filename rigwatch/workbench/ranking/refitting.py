@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 from rigwatch.physics.engine.compile import cores, side_by_side
@@ -60,9 +59,8 @@ def refit(
     if not fits and not data.along_motion:
         # Where the base model ended need not be near the model with the effect.
         start, placed = ended | given_values(study), (*base.placements, row.placement)
-        short = partial(fit_model, from_short_horizons=True)
         with suppress(ModelError):
-            fits.append(short(study, data, placed, start, base.train.scale, base=base))
+            fits.append(fitting(study, data, placed, start, base.train.scale, base=base))
     if not fits:
         row.reason, row.failure = UNFITTABLE, failures[0]
         return
