@@ -11,7 +11,7 @@ from rigwatch.physics.engine.equations.system import Placement, compose
 from rigwatch.physics.engine.fit.recording import Recording, windows
 from rigwatch.physics.engine.fit.windowed_fit import fit
 from rigwatch.physics.engine.score.candidates import Candidate, root_mean_square, shaped
-from rigwatch.physics.engine.score.compatibility import suits
+from rigwatch.physics.engine.score.compatibility import possible, suits
 from rigwatch.physics.engine.score.effect_sensitivities import directions
 from rigwatch.physics.engine.score.score_test import Projector, score
 from rigwatch.physics.engine.score.trajectory import trajectory
@@ -167,3 +167,12 @@ def test_a_signal_without_samples_has_no_size_and_gives_no_warning(recwarn):
     assert root_mean_square(np.full(5, np.nan)) == 1.0
     assert root_mean_square(np.array([3.0, np.nan, -3.0])) == 3.0
     assert not recwarn.list
+
+
+@pytest.mark.parametrize(
+    ("times", "may_be"), [(0.5, True), (4.0, True), (20.0, False), (-0.5, False)]
+)
+def test_an_estimated_strength_may_be_several_times_its_bound_with_its_sign(times, may_be):
+    (late,) = shaped("delay", library()["delay"].scaled({"dt": DT, "u": 1.0}), "position_sensor")
+
+    assert possible(late, times * late.effect.parameters["tau"].high) is may_be

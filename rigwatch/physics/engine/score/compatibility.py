@@ -10,6 +10,10 @@ from rigwatch.wire.units import unit_of
 _SPEEDS = tuple(unit_of(unit).dimension for unit in ("m/s", "rad/s"))
 
 
+BEYOND = 10.0
+"""Ratio of a strength as a score estimates it to its bound up to which it may be within."""
+
+
 def suits(effect: Effect, port: Port, model: Model) -> bool:
     """Whether the effect is compatible with the port and the port has all its variables."""
     if not effect.fits(port.kind) or effect.family in port.described:
@@ -68,9 +72,13 @@ def _named(effect: Effect) -> frozenset[str]:
 
 
 def possible(candidate: Candidate, strength: float) -> bool:
-    """Whether the strength estimated by a score has a sign that its bounds allow."""
+    """Whether the strength that a score estimates has a sign, and about a size, within its bounds.
+
+    Where other parameters have followed what is missing, it is several times too large: that of a
+    delay of some samples is beyond a hundred of them.
+    """
     p = candidate.effect.parameters[candidate.effect.strength]
     if p.role == "switch":
         return strength > 0
-    value = p.neutral + strength
-    return min(p.low, p.neutral) <= value <= max(p.high, p.neutral)
+    furthest = max(p.high - p.neutral, 0.0) if strength > 0 else max(p.neutral - p.low, 0.0)
+    return abs(strength) <= BEYOND * furthest
