@@ -118,7 +118,7 @@ def _begin_again(  # noqa: PLR0917 -- they belong together
         tried.add(row.label)
         if not row.begun_again:
             progress(f"fitting {row.label} again, starting from the given values")
-            refit_from_given(study, data, base, floor, row)
+            refit_from_given(study, data, base, row)
 
 
 def _begin_from_best(  # noqa: PLR0917 -- they belong together

@@ -197,18 +197,17 @@ def refit_elsewhere(
         judge_fit(base, row)
 
 
-def refit_from_given(
-    study: Study, data: Data, base: Fitted, floor: NoiseFloor, row: Ranked
-) -> None:
+def refit_from_given(study: Study, data: Data, base: Fitted, row: Ranked) -> None:
     """Begin a fitted row once more from the model's given values; the better fit is kept.
 
-    What still leaves more than noise begins over short horizons as well: the fewer periods of a
-    motion a window holds, the fewer local minima there are.
+    One that leaves more than the base model, or whose strength is open, ended where it says nothing
+    and begins over short horizons as well: the fewer periods of a motion a window holds, the fewer
+    local minima there are.
     """
     assert row.fitted is not None
     row.begun_again = True
     _keep_better(base, row, begun_from_given(study, data, row.fitted))
-    if not leaves_only_noise(study, data, floor, row):
+    if row.vague or row.fitted.train_error > base.train_error:
         _keep_better(base, row, begun_over_short_horizons(study, data, row.fitted, row.begin()))
 
 

@@ -395,6 +395,6 @@ def _tried(bench: Bench, effect: str, port: str) -> Ranked:
         raise ModelError(f"{row.label}: cannot be fitted: {row.failure}")
     if leaves_only_noise(bench.study, bench.data, bench.floor, row):
         return row
-    refit_from_given(bench.study, bench.data, bench.base, bench.floor, row)
+    refit_from_given(bench.study, bench.data, bench.base, row)
     shared = fitted_beside_healthy(bench, row)
     return row if shared is None else shared[1]

@@ -119,7 +119,7 @@ def test_what_ends_in_a_local_minimum_begins_over_short_horizons(tmp_path: Path)
     stuck = row.fitted
     assert stuck is not None
     assert begun_from_given(study, data, stuck) is stuck
-    refit_from_given(study, data, base, bench.floor, row)
+    refit_from_given(study, data, base, row)
     assert row.fitted is not None
     assert row.fitted.train_error < 0.1 * stuck.train_error
     assert row.fitted.train.values()["I"] == pytest.approx(INERTIA, rel=0.05)
@@ -137,7 +137,7 @@ def test_what_ended_above_the_base_begins_from_the_best_ones_parameters(tmp_path
 
     best, stuck = row("hard_stop"), row("cubic_stiffness", hull_cubic_stiffness_k3=-200.0)
     stuck.likely = True
-    refit_from_given(study, data, base, bench.floor, best)
+    refit_from_given(study, data, base, best)
     assert stuck.fitted is not None
     assert stuck.fitted.train_error > base.train_error > (best.fitted or base).train_error
     _begin_from_best(study, data, base, [best, stuck], bench.floor, no_progress)
