@@ -1,11 +1,12 @@
 """What waits in Zenoh's channel for a process of several rigs: each message once and in order."""
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from rigwatch.wire.bus import SharedLinks, connect
+from rigwatch.wire.bus import Bus, SharedLinks, connect
 from rigwatch.wire.bus.several import WAITING
 from rigwatch.wire.delivery import SampleReader, SampleRing
 from rigwatch.wire.messages import ALARMS, SAMPLES, SampleBlock
@@ -69,26 +70,28 @@ def test_what_a_process_said_before_its_end_is_not_taken_for_lost(
     other = connect(rig.config, "other", PATIENCE, links)
     alarms, outside = other.listen(ALARMS), rig.bus("outside")
 
-    def listens() -> bool:
-        outside.publish(ALARMS, alarm(EARLIER))
-        return bool(alarms.catch_up(0.05))
+    said: list[int] = []
 
-    eventually(listens, "that the router knows of the listener")
+    def hears(seq: int) -> bool:
+        heard = [message.seq for message in alarms.catch_up(0.05)]
+        said.extend(each for each in heard if each < EARLIER)
+        return seq in heard
+
+    def reaches(source: Bus, seq: int) -> bool:
+        source.publish(ALARMS, alarm(seq))
+        return hears(seq)
+
+    eventually(lambda: reaches(outside, EARLIER), "that the router knows of the listener")
     for run in range(3):
         monitor = connect(rig.config, "monitor", PATIENCE)
         eventually(lambda: "alive/monitor" in outside.tokens("alive/*"), "its token")
+        known = partial(reaches, monitor, EARLIER + 1 + run)
+        eventually(known, "that it knows of the listener")
         for seq in range(3):
             monitor.publish(ALARMS, alarm(10 * run + seq))
         monitor.close()
         eventually(lambda: "alive/monitor" not in outside.tokens("alive/*"), "its end")
-    said: list[int] = []
-
-    def complete() -> bool:
-        heard = [message.seq for message in alarms.catch_up(0.05)]
-        said.extend(seq for seq in heard if seq != EARLIER)
-        return 22 in said
-
-    eventually(complete, "all")
+    eventually(lambda: hears(22), "all")
     assert said == [0, 1, 2, 10, 11, 12, 20, 21, 22]
     assert alarms.lost == alarms.foreign == 0
     other.close()

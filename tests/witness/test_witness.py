@@ -194,7 +194,14 @@ def test_a_second_monitor_at_the_key_of_the_first_is_an_alarm_too(tmp_path: Path
         monitor.announce()
         eventually(lambda: bool(page.names(f"{SAID_KEY}/monitor")), "the monitor")
         assert not any(told() for _ in range(20))
-        (key,) = page.transport.tokens(page.key(f"{SAID_KEY}/monitor/*"), 1.0)
+        keys: list[str] = []
+
+        def answers() -> bool:
+            keys[:] = page.transport.tokens(page.key(f"{SAID_KEY}/monitor/*"), 1.0)
+            return bool(keys)
+
+        eventually(answers, "the key of the monitor")
+        (key,) = keys
         name = f"7/1/{stranger.transport.identity}"
         ends = [
             stranger.transport.serve(key, lambda _: [said(key, name)]),
