@@ -1,6 +1,5 @@
 """Ranks the effects that may be missing, gives a verdict and proposes the next experiment."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from msgspec import structs
@@ -413,9 +412,10 @@ def _ranked(
     if stopped is None:
         return _ranked_on(bench, progress, rows)
     if _may_lack_an_effect(bench):
-        found = _ranked_on(bench, progress, rows)
-        if _leaves_only_noise(*found):
-            return _with_base_told(found, stopped)
+        judged, ranked, found = _ranked_on(bench, progress, rows)
+        if _leaves_only_noise(judged, found):
+            told = BASE_NOT_CONVERGED.format(why=stopped.text.partition(";")[0])
+            return judged, ranked, replace(found, text=f"{found.text}; {told}")
     rows = rank_all(bench.study, bench.data, bench.base)
     return bench, rows, with_base_offered(bench, stopped)
 
@@ -438,21 +438,12 @@ def _may_lack_an_effect(bench: Bench) -> bool:
     return not_converged({"the model": bench.base.convergence}) is not None
 
 
-def _leaves_only_noise(bench: Bench, _rows: Sequence[Ranked], found: Verdict) -> bool:
+def _leaves_only_noise(bench: Bench, found: Verdict) -> bool:
     """Whether the effect named leaves only noise: nothing else could describe the logs better."""
     best = found.best
     if found.word != "missing_effect" or found.beside or best is None or best.fitted is None:
         return False
     return leaves_only_noise(bench.study, bench.data, bench.floor, best)
-
-
-def _with_base_told(
-    found: tuple[Bench, list[Ranked], Verdict], stopped: Verdict
-) -> tuple[Bench, list[Ranked], Verdict]:
-    """What was found, with how the model without it was fitted."""
-    bench, rows, verdict = found
-    told = BASE_NOT_CONVERGED.format(why=stopped.text.partition(";")[0])
-    return bench, rows, replace(verdict, text=f"{verdict.text}; {told}")
 
 
 def _beside_best_base(

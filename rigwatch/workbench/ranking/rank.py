@@ -134,16 +134,16 @@ def _begin_from_best(  # noqa: PLR0917 -- they belong together
     The base model's may be far off while an effect is missing, and only some that resemble it come
     back from there: sliding with presliding, say, and not dry friction itself.
     """
-    astray = [row for row in rows if row.likely and row.fitted is not None]
-    astray = [row for row in astray if row.fitted and row.fitted.train_error > base.train_error]
-    for row in astray[:BEGUN_AGAIN]:
+    likely = ((row, row.fitted) for row in rows if row.likely and row.fitted is not None)
+    astray = [(row, found) for row, found in likely if found.train_error > base.train_error]
+    for row, found in astray[:BEGUN_AGAIN]:
         best = in_order(rows)[0]
         if best.fitted is None or leaves_only_noise(study, data, floor, best):
             return
         progress(f"fitting {row.label} again, starting from the parameters beside {best.label}")
         begun = replace(row)
         refit(study, data, base, begun, fit_from(best.fitted))
-        if begun.fitted and row.fitted and begun.fitted.train_error < row.fitted.train_error:
+        if begun.fitted is not None and begun.fitted.train_error < found.train_error:
             row.take(begun)
 
 

@@ -294,8 +294,8 @@ def _unit(header: Header, channel: str, signal: Input | Output) -> tuple[str, li
             rate where an angle matters.
     """
     wanted = signal.shown or signal.unit
-    written = next((u for u in header.units if as_meant(u, wanted)), "")
-    unit = as_meant(written, wanted) if written else ""
+    readings = ((as_meant(each, wanted), each) for each in header.units)
+    unit, written = next((reading for reading in readings if reading[0]), ("", ""))
     if not unit and header.unknown and wanted not in ("", "1"):
         raise ModelError(_no_unit(header, f"--map '{channel}={header.column}[{wanted}]'"))
     if not unit and header.units:

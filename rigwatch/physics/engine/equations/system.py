@@ -284,7 +284,7 @@ class _Composer:
 
     def _is_ready(self, name: str, waiting: list[str]) -> bool:
         """Whether all that a port's signal and variables use is defined, but for itself."""
-        behind = {self._model.ports[name].signal} & {*self._waiting}
+        behind = self._model.ports[name].signal in self._waiting
         return not behind and not self._in_variables(name) & {*waiting} - {name}
 
     def _in_variables(self, name: str) -> frozenset[str]:
