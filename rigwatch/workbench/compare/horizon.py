@@ -9,6 +9,9 @@ resonance, and only what shifts the mean is left. A light damper rings for hundr
 which the smallest error of the frequency adds up; a dozen are enough. To find the modes, the model
 is fitted once over a horizon derived from the outputs.
 
+Where a deviation grows by itself, as of a levitated or an inverted body under a controller, a long
+horizon only shows how it grows, and its fits end anywhere: the horizon is a few e-foldings at most.
+
 A drive that steps once a minute meets windows of a minute always at the same place. If that is a
 window's beginning or end, the window's own initial state takes up all that a lag does after a step.
 The horizon is then shortened until the steps fall inside the windows.
@@ -24,7 +27,13 @@ from rigwatch.physics.engine.score import autocorrelation, first_below
 from rigwatch.wire.arrays import BoolArray, ComplexArray, FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, predicts_along_motion, prepare, scale_of_several
-from rigwatch.workbench.fit import Fitted, eigenvalues, fit_base, with_hold
+from rigwatch.workbench.fit import (
+    Fitted,
+    eigenvalues,
+    fit_base,
+    given_eigenvalues,
+    with_hold,
+)
 from rigwatch.workbench.study import Study
 
 SPANS = 3.0
@@ -33,6 +42,8 @@ PERIODS = 2.0
 """Smallest number of periods in a horizon if the slowest motion oscillates."""
 MOST_PERIODS = 12.0
 """The same at most."""
+GROWTHS = 3.0
+"""Longest horizon over the time in which a deviation grows e-fold."""
 WINDOWS, FEWEST_WINDOWS = 10, 4
 """Minimum number of windows in the shortest recording, and if they would not span two periods."""
 LIMITED = ", limited to a tenth of the shortest recording"
@@ -63,16 +74,21 @@ def with_horizon(study: Study) -> Study:
     shortest = _shortest(data)
     longest, least = shortest / WINDOWS, FEWEST * data.train.dt
     begin = float(np.clip(_from_correlation(data.train), least, max(longest, least)))
+    begin = max(min(begin, _growth_limit(given_eigenvalues(study, data.train))), least)
     begin, shortened = _within_windows(begin, data)
     study = _with_source(study, f"how fast the outputs change{shortened}", begin)
     try:
         fitted, data = _fitted_once(study)
     except ModelError:
         return study
-    slowest = _slowest(eigenvalues(fitted, data.train), shortest)
+    modes = eigenvalues(fitted, data.train)
+    slowest, most = _slowest(modes, shortest), _growth_limit(modes)
     if slowest is None:
         return study
     constant, name, swings = slowest
+    if most < constant:
+        name = f"a deviation that grows e-fold in {most / GROWTHS:.2g} s"
+        constant, swings = most, 0.0
     # Within less than two periods an initial state stands in for what is missing.
     needed = min(swings, shortest / FEWEST_WINDOWS)
     chosen = float(np.clip(constant, least, max(longest, least, needed)))
@@ -157,6 +173,12 @@ def _slowest(found: ComplexArray, longest: float) -> tuple[float, str, float] | 
         words = f"the model's period of {period:.2g} s that decays in {decay:.2g} s"
         return slowest, words, PERIODS * float(period)
     return slowest, f"the model's time constant of {slowest / SPANS:.2g} s", 0.0
+
+
+def _growth_limit(found: ComplexArray) -> float:
+    """Longest horizon for modes of which one grows [s]; infinite if none does in most windows."""
+    growth = float(np.median(found.real.max(axis=1))) if found.size else 0.0
+    return GROWTHS / growth if growth > 0 else np.inf
 
 
 def _oscillates(rate: ComplexArray) -> BoolArray:

@@ -5,6 +5,10 @@ come later, and stand in for each other until the rows are in order. A model fil
 is held, but not in which row a log has its value. So the model is fitted with both orders, and the
 later one is taken only if the error falls much, in training and held out. With effects accepted the
 order stays: a wrong one among them may be mended by a wrong order.
+
+Where a controller's command follows the motion, an earlier command damps it, so that a later row
+may stand for missing drag. If more than noise is left, each order is asked what its most likely
+effects leave, and the given one stays where they leave less with it.
 """
 
 from dataclasses import replace
@@ -12,15 +16,23 @@ from dataclasses import replace
 from rigwatch.physics.engine.fit import Fit, Recording
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.data import Data, predicts_along_motion, scale_of_several, with_next_rows
+from rigwatch.workbench.data import (
+    Data,
+    held_out_floor,
+    predicts_along_motion,
+    scale_of_several,
+    with_next_rows,
+)
 from rigwatch.workbench.fit import Fitted, fit_base, fit_model
-from rigwatch.workbench.ranking import difference
+from rigwatch.workbench.ranking import difference, rank_all, refit
 from rigwatch.workbench.study import HEALTHY, RECORDINGS, Held, Study
 
 MUCH = 0.1
 """Relative fall of the rms error that is required."""
 LEVEL = 1e-3
 """Largest probability that chance lowers either error so far."""
+MOST_FITTED = 2
+"""Effects that are fitted with each order."""
 
 
 def with_row_order(study: Study, data: Data) -> tuple[Study, Data]:
@@ -41,6 +53,9 @@ def with_row_order(study: Study, data: Data) -> tuple[Study, Data]:
     before = fit_base(study, own, scale)
     after = _fitted_with_next_rows(study, own, names, before, scale)
     if after is None or not _much_better(before, after):
+        return study, data
+    ordered = _ordered(study, own, names)
+    if data.healthy is None and _explains_more_as_given(study, (own, before), (ordered, after)):
         return study, data
     source = RECORDINGS if data.healthy is None else HEALTHY
     ratio = after.train_error / before.train_error
@@ -80,6 +95,31 @@ def _ordered(study: Study, data: Data, names: list[str]) -> Data:
         healthy=data.healthy and put_right(data.healthy),
         openings=data.openings and put_right(data.openings),
     )
+
+
+def _explains_more_as_given(
+    study: Study, given: tuple[Data, Fitted], later: tuple[Data, Fitted]
+) -> bool:
+    """Whether an effect leaves much less with the rows as they are than any with later ones."""
+    data, after = later
+    floor = held_out_floor(study, data, after.train, after.held_out)
+    if floor.reached(after.held_out):
+        return False
+    best = _best_effect(study, *given)
+    if best is None or not _much_better(after, best):
+        return False
+    other = _best_effect(study, *later)
+    return other is None or _much_better(other, best)
+
+
+def _best_effect(study: Study, data: Data, base: Fitted) -> Fitted | None:
+    """The fit with the effect, of those that explain most to first order, that leaves least."""
+    rows = [row for row in rank_all(study, data, base) if not row.failure]
+    likely = sorted(rows, key=lambda row: -row.explained)[:MOST_FITTED]
+    for row in likely:
+        refit(study, data, base, row, fit_model)
+    fits = [row.fitted for row in likely if row.fitted is not None and row.accepted]
+    return min(fits, key=lambda fitted: fitted.train_error, default=None)
 
 
 def _much_better(before: Fitted, after: Fitted) -> bool:

@@ -41,7 +41,7 @@ from rigwatch.physics.engine.search import (
     kept_promise,
     multi_start_fit,
 )
-from rigwatch.wire.arrays import ComplexArray, FloatArray
+from rigwatch.wire.arrays import ComplexArray, FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, parameters_of, port_sizes, quiet_scale
 from rigwatch.workbench.fit.discontinuities import away_from_jumps
@@ -443,15 +443,41 @@ def _fastest(fitted: Fitted, recording: Recording) -> float:
 
 def eigenvalues(fitted: Fitted, recording: Recording) -> ComplexArray:
     """Eigenvalues of the model at the start of its windows [1/s], shape (windows, states)."""
-    cut = windows(fitted.compiled.system, len(recording), fitted.horizon)
-    starts = cut.starts[:LOOKED_AT]
+    starts = windows(fitted.compiled.system, len(recording), fitted.horizon).starts[:LOOKED_AT]
     # Without states of its own a model has an initial state for each recording, and one window.
-    run = fitted.compiled.linearise(
+    initial = fitted.train.initial[: len(starts)]
+    parameters, substeps = fitted.train.parameters, fitted.substeps
+    return _eigenvalues(fitted.compiled, recording, starts, initial, parameters, substeps)
+
+
+def given_eigenvalues(study: Study, recording: Recording) -> ComplexArray:
+    """The same at moments all over the recording, of the model as it is given.
+
+    States have there what channels show, others their starting value.
+    """
+    start = parameters_of(study.file)
+    compiled = _compiled(study, placements_of(study, recording), start, recording.dt)
+    every = max(len(recording) // LOOKED_AT, 2)
+    starts = np.arange(0, len(recording) - 1, every, dtype=np.int64)[:LOOKED_AT]
+    parameters = compiled.vector(start)
+    initial = initial_states(compiled.system, recording)[starts]
+    return _eigenvalues(compiled, recording, starts, initial, parameters, study.file.substeps)
+
+
+def _eigenvalues(  # noqa: PLR0917 -- they belong together
+    compiled: CompiledSystem,
+    recording: Recording,
+    starts: IntArray,
+    initial: FloatArray,
+    parameters: FloatArray,
+    substeps: int,
+) -> ComplexArray:
+    run = compiled.linearise(
         recording.inputs, recording.spacing, starts, 2,
-        initial=fitted.train.initial[: len(starts)], parameters=fitted.train.parameters,
-        substeps=fitted.substeps, begins=recording.begins, time=recording.time,
+        initial=initial, parameters=parameters,
+        substeps=substeps, begins=recording.begins, time=recording.time,
     )  # fmt: skip
-    free, n = len(fitted.compiled.system.free), run.states.shape[2]
+    free, n = len(compiled.system.free), run.states.shape[2]
     slopes = run.rate_slopes[:, 0, :, free : free + n]
     finite = slopes[np.isfinite(slopes).all(axis=(1, 2))]
     return np.asarray(np.linalg.eigvals(finite), np.complex128)
