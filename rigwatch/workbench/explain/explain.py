@@ -198,10 +198,12 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
 
     An effect that is named although it leaves much may be the likeness of a rarer one, as friction
     is of friction behind a gap. What is found has to leave nothing and, in place of an effect that
-    is named, half its error above noise at most. Effects are fitted again only if the score of a
-    rarer one, corrected for the number of all, is more than chance. Where nothing held out is
-    missing, the training must certainly ask for it. Where a healthy recording checks a model along
-    its measured motion, rarer ones are tried as refinements already, and fits take long.
+    is named, half its error above noise at most. What leaves something, but clearly less than the
+    effect that is named, or as much, is told without confidence. Effects are fitted again only if
+    the score of a rarer one, corrected for the number of all, is more than chance. Where nothing
+    held out is missing, the training must certainly ask for it. Where a healthy recording checks a
+    model along its measured motion, rarer ones are tried as refinements already, and fits take
+    long.
     """
     bench, told = first.bench, first.explanation
     rarer = suitable(bench.study)[1]
@@ -222,7 +224,8 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
         return _with_rarer_tried(first, none)
     second = _explained_once(replace(bench, study=wider), progress, rows, first)
     found = second.explanation
-    if found.verdict not in STRENGTH_TOLD or not _is_better(first, second):
+    better = found.verdict in STRENGTH_TOLD and _is_better(first, second)
+    if not (better or _speaks_against_named(first, second)):
         return _with_rarer_tried(first, none)
     text = RARER.format(text=found.text, count=len(rarer))
     unlike = "; ".join([*filter(None, [found.unlike]), SECOND_PASS])
@@ -230,10 +233,31 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
         found, text=text, unlike=unlike, wrong_probability=None, wrong_at_most=None,
         tried_rarer=True,
     )  # fmt: skip
+    if not better:
+        rivals = dict.fromkeys([*doubted.rivals, first.rows[0].label])
+        doubted = replace(doubted, rivals=list(rivals))
     # Usual effects found nothing to explain: one of many rarer ones is not named with confidence.
-    if told.verdict == "nothing_missing" and found.verdict == "missing_effect":
+    surely = better and told.verdict != "nothing_missing"
+    if found.verdict == "missing_effect" and not surely:
         doubted = _unsure(doubted)
     return replace(second, explanation=doubted)
+
+
+def _speaks_against_named(first: Explained, second: Explained) -> bool:
+    """Whether rarer effects explain as much as one that is named alone, or clearly more.
+
+    Clearly more: less than half of the energy above noise that it leaves.
+    """
+    before, after = first.explanation, second.explanation
+    if before.verdict != "missing_effect" or after.verdict not in STRENGTH_TOLD or before.beside:
+        return False
+    if after.verdict == "undetermined" and first.rows[0].label in after.rivals:
+        return True
+    named, rarer, floor = first.rows[0].fitted, second.rows[0].fitted, first.bench.floor
+    if named is None or rarer is None or not second.rows[0].accepted:
+        return False
+    held_out = floor.left_over(named.held_out, rarer.held_out)
+    return max(held_out, floor.of_training.left_over(named.train, rarer.train)) < HALF
 
 
 def _asks_for_rarer(found: Explained) -> bool:
