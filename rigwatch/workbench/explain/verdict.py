@@ -76,6 +76,7 @@ class Verdict:
         evidence: what the verdict is based on.
         beside: labels of the other effects of the set that it was judged in.
         together: the fit with both effects, if two are missing at once.
+        alone: whether a second effect was sought that explains what it leaves, and none does.
     """
 
     word: Word
@@ -87,6 +88,7 @@ class Verdict:
     evidence: Evidence = field(default_factory=Evidence)
     beside: tuple[str, ...] = ()
     together: Fitted | None = None
+    alone: bool = False
 
     @property
     def probability_wrong(self) -> float:

@@ -22,7 +22,7 @@ from rigwatch.physics.engine.compile import side_by_side
 from rigwatch.physics.engine.score import ALIKE
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench, spoils_healthy
-from rigwatch.workbench.explain.rough_verdict import much_left
+from rigwatch.workbench.explain.rough_verdict import acts_alone, much_left
 from rigwatch.workbench.explain.verdict import Verdict, Word, judge
 from rigwatch.workbench.fit import Fitted, fit_model
 from rigwatch.workbench.ranking import (
@@ -76,7 +76,7 @@ def two_effects(
     *,
     tolerant: bool = True,
 ) -> Verdict:
-    """The verdict after trying pairs; unchanged if no pair explains the error.
+    """The verdict after trying pairs; the same effect if no pair explains the error.
 
     Args:
         bench: the study.
@@ -90,13 +90,16 @@ def two_effects(
     if fits and not good:
         rows, fits = _refined(bench, rows, fits, progress)
         good = _explaining(bench, fits, tolerant=tolerant)
+    beside = [] if bench.study.model.rough else [fitted for _, fitted in fits]
+    alone = acts_alone(bench.base, bench.floor, verdict, beside)
+    single = dataclasses.replace(verdict, alone=alone)
     if not good:
-        return verdict
+        return single
     best, together = min(good, key=lambda found: found[1].held_out_error)
     first = _verdict_with(bench, rows, fits, best.other, best.one)
     second = _verdict_with(bench, rows, fits, best.one, best.other)
     if first is None or second is None:
-        return verdict
+        return single
     found = _both_named(bench, first, second, together)
     return dataclasses.replace(found, best=_row(rows, found.best))
 
