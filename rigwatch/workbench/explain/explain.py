@@ -71,6 +71,7 @@ from rigwatch.workbench.ranking import (
 from rigwatch.workbench.study import Refusals, Study, refusals, told
 
 RARER = "{text}; it was found among {count} rarer effects, as no usual one explains the error"
+BESIDE = "{text}; {count} rarer effects were tried, as {what} leaves much by itself"
 OPEN = ("undetermined", "unknown_effect", "model_inadequate")
 """Verdicts that name no effect, and do not say that none is missing."""
 BY_CHANCE = 0.05
@@ -227,20 +228,32 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
     better = found.verdict in STRENGTH_TOLD and _is_better(first, second)
     if not (better or _speaks_against_named(first, second)):
         return _with_rarer_tried(first, none)
-    text = RARER.format(text=found.text, count=len(rarer))
+    text, rivals = RARER.format(text=found.text, count=len(rarer)), found.rivals
+    if not better:
+        text, rivals = _beside_named(first, second, len(rarer))
     unlike = "; ".join([*filter(None, [found.unlike]), SECOND_PASS])
     doubted = replace(
-        found, text=text, unlike=unlike, wrong_probability=None, wrong_at_most=None,
-        tried_rarer=True,
+        found, text=text, rivals=rivals, unlike=unlike, wrong_probability=None,
+        wrong_at_most=None, tried_rarer=True,
     )  # fmt: skip
-    if not better:
-        rivals = dict.fromkeys([*doubted.rivals, first.rows[0].label])
-        doubted = replace(doubted, rivals=list(rivals))
     # Usual effects found nothing to explain: one of many rarer ones is not named with confidence.
     surely = better and told.verdict != "nothing_missing"
     if found.verdict == "missing_effect" and not surely:
         doubted = _unsure(doubted)
     return replace(second, explanation=doubted)
+
+
+def _beside_named(first: Explained, second: Explained, count: int) -> tuple[str, list[str]]:
+    """Text and rivals of what rarer effects explain, where a usual one was named that leaves much.
+
+    Args:
+        first, second: the explanations by usual effects and by all.
+        count: rarer effects that were tried.
+    """
+    named, found = first.rows[0].label, second.explanation
+    others = dict.fromkeys([*found.rivals, named])
+    text = BESIDE.format(text=found.text, count=count, what=named)
+    return text, [label for label in others if label != second.rows[0].label]
 
 
 def _speaks_against_named(first: Explained, second: Explained) -> bool:
@@ -251,7 +264,8 @@ def _speaks_against_named(first: Explained, second: Explained) -> bool:
     before, after = first.explanation, second.explanation
     if before.verdict != "missing_effect" or after.verdict not in STRENGTH_TOLD or before.beside:
         return False
-    if after.verdict == "undetermined" and first.rows[0].label in after.rivals:
+    label, alike = first.rows[0].label, [second.rows[0].label, *after.rivals]
+    if after.verdict == "undetermined" and label in alike:
         return True
     named, rarer, floor = first.rows[0].fitted, second.rows[0].fitted, first.bench.floor
     if named is None or rarer is None or not second.rows[0].accepted:

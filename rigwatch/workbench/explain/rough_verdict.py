@@ -152,7 +152,8 @@ def undetermined_if_much_left(base: Fitted, floor: NoiseFloor, found: Verdict) -
         told = f"{left:.2f} times the {of}, expected at most {MUCH:g}"
     else:
         share = floor.beyond_own_error(base.held_out, fitted.held_out, fitted.calm)
-        told = f"{share:.0%} of the error beyond the model's own, expected at most {SHARE:.0%}"
+        most = SHARE_ALONE if found.alone else SHARE
+        told = f"{share:.1%} of the error beyond the model's own, expected at most {most:.0%}"
     text = f"{found.best.label} explains most, but leaves {told}: another effect may act as well"
     return replace(found, word="undetermined", text=text)
 

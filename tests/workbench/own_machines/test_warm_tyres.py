@@ -61,3 +61,4 @@ def test_what_a_rarer_effect_explains_better_is_not_named(tmp_path: Path) -> Non
     assert (found.verdict, found.rivals) == ("undetermined", ["drift@speedometer"])
     assert found.ranking[0].effect == "coulomb_running_in"
     assert found.text.startswith("likely, not certain: coulomb_running_in@road is missing")
+    assert found.text.endswith("as drift@speedometer leaves much by itself")

@@ -11,6 +11,7 @@ from rigwatch.workbench.data.noise.error_spectrum import ErrorSpectrum
 from rigwatch.workbench.data.noise.noise_floor import NoiseFloor
 from rigwatch.workbench.explain.adequacy import unchecked
 from rigwatch.workbench.explain.rough_verdict import (
+    acts_alone,
     leaves_much,
     leaves_some,
     limited_verdict,
@@ -54,6 +55,40 @@ def test_one_effect_that_leaves_much_of_a_rough_model_is_not_named_with_confiden
 def test_a_strong_effect_may_leave_more_as_it_changes_the_motion() -> None:
     assert limited_verdict(left(28.0), [], FLOOR, naming(3.3)).word == "missing_effect"
     assert limited_verdict(left(7.3), [], FLOOR, naming(2.0)).word == "undetermined"
+
+
+class ByFrequency:
+    """A floor whose model's own error is one noise floor in every fit."""
+
+    method, own_error = "healthy motion", True
+
+    def beyond_own_error(self, before: Any, after: Any, _calm: None) -> float:
+        """What is left of the square above it."""
+        return float((after.rms[0] ** 2 - 1) / (before.rms[0] ** 2 - 1))
+
+
+OWN: Any = ByFrequency()
+
+
+@pytest.mark.parametrize(
+    ("best", "beside", "word"),
+    [
+        pytest.param(1.55, (1.47, 1.52), "missing_effect", id="4 %, of which 82 % remain"),
+        pytest.param(1.55, (1.2, 1.52), "undetermined", id="4 %, of which a second explains much"),
+        pytest.param(1.8, (1.75, 1.79), "undetermined", id="6.4 %, whatever remains"),
+        pytest.param(1.55, (), "undetermined", id="no second effect could be tried"),
+        pytest.param(1.3, (), "missing_effect", id="2 %"),
+    ],
+)
+def test_more_may_be_left_where_no_second_effect_explains_that(
+    best: float, beside: tuple[float, ...], word: str
+) -> None:
+    base, found = left(6.0), naming(best)
+    alone = acts_alone(base, OWN, found, [left(each) for each in beside])
+    judged = undetermined_if_much_left(base, OWN, replace(found, alone=alone))
+    assert judged.word == word
+    told = "it leaves 4% of the error beyond" in judged.text
+    assert told == (alone and word == "missing_effect")
 
 
 def test_a_share_above_the_floor_hides_nothing_where_the_error_is_known_by_frequency() -> None:
