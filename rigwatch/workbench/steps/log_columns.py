@@ -30,6 +30,8 @@ SET_VALUES = frozenset(
     )
 )
 """Words in the name of a column that has a set value, which no sensor has read."""
+SHORTEST_HEAD = 4
+"""Letters of a word that counts as what a compound is a kind of."""
 PER_MINUTE = Fraction(1, 60)
 AS_READ = {"g0": "standard gravity (g0)", "mg0": "thousandths of standard gravity (mg0)"}
 IN_CELSIUS = "; for degrees Celsius give --map '{channel}={column}[degC]'"
@@ -246,16 +248,29 @@ def _named(name: str, signal: Input | Output, headers: Sequence[Header]) -> Head
 
 
 def _akin(name: str, signal: Input | Output, headers: Sequence[Header]) -> Header | None:
-    """The column with a matching unit that shares most words with a signal's name."""
+    """The column with a matching unit that shares most words with a signal's name.
+
+    A compound counts as its last word, as `headwind` does for `wind`.
+    """
     words = {word for word in name.lower().split("_") if len(word) > 1}
+
+    def count(header: Header) -> int:
+        own = header.name.split("_")
+        return sum(any(_is_head(word, each) for each in own) for word in words)
+
     shared = {
-        header: len(words & set(header.name.split("_")))
+        header: count(header)
         for header in headers
         if header.units and _fits(header, signal) and not _is_set_value(header, signal)
     }
     most = max(shared.values(), default=0)
     chosen = [header for header, count in shared.items() if count == most]
     return chosen[0] if most and len(chosen) == 1 else None
+
+
+def _is_head(word: str, compound: str) -> bool:
+    """Whether a word is another, or what that is a kind of."""
+    return word == compound or (len(word) >= SHORTEST_HEAD and compound.endswith(word))
 
 
 def _measured(_name: str, signal: Input | Output, headers: Sequence[Header]) -> Header | None:

@@ -201,3 +201,28 @@ def test_a_column_of_another_signal_is_not_offered():
     columns = ["Time (s)", "force_N", "drive_point [m/s^2]", "tip [mm]"]
     with pytest.raises(ModelError, match=r"--map tip_point=COLUMN\[m/s\^2\]$"):
         matched(columns, BEAM, {})
+
+
+CART = parse(
+    """
+name = "cart"
+summary = "A cart in the wind."
+inputs.wind = { unit = "m/s" }
+parameters.m = { value = 1.0, unit = "kg" }
+parameters.c = { value = 1.0, unit = "kg/s" }
+states.v = { unit = "m/s", derivative = "-c*(v + wind)/m", measured = "speed" }
+outputs.speed = { unit = "m/s", expression = "v" }
+""",
+    Model,
+    "cart.toml",
+)
+
+
+@pytest.mark.parametrize(
+    ("wind", "speed_header"),
+    [("headwind [m/s]", "car [km/h]"), ("Gegenwind [m/s]", "Geschwindigkeit [km/h]")],
+)
+def test_a_compound_counts_as_what_it_is_a_kind_of(wind, speed_header):
+    found = matched(["time [s]", speed_header, wind], CART, {}).channels
+    names = {name: column.rsplit("[", 1)[0] for name, column in found.items()}
+    assert names == {"wind": wind, "speed": speed_header}
