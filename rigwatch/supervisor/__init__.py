@@ -3,6 +3,7 @@
 plan.py        which processes a configuration asks for, and whose samples each uses
 several.py     the same for several rigs
 vitals.py      what a process has reported, and when it counts as hung
+processor_time.py  whether a process that passes no samples on only waits for a processor
 child.py       one process: start, notifications, output, end
 supervisor.py  all processes: restart with back-off, status, orderly stop
 config_watch.py  a change of the configuration restarts what it concerns

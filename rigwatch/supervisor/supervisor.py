@@ -22,6 +22,7 @@ from typing import Literal
 
 from rigwatch.supervisor.child import Child
 from rigwatch.supervisor.plan import ProcessPlan
+from rigwatch.supervisor.processor_time import ProcessorWait
 from rigwatch.supervisor.vitals import Limits, Vitals
 from rigwatch.wire.errors import RigwatchError, reason_of
 
@@ -65,6 +66,7 @@ class Watched:
     was_ready: bool = False
     held: bool = False
     finished: bool = False
+    wait: ProcessorWait | None = None
 
     @property
     def vitals(self) -> Vitals:
@@ -217,11 +219,26 @@ class Supervisor:
             return
         source, router = self._vitals_of(watched.child.plan.source), self._vitals_of("router")
         complaint = watched.vitals.complaint(source, now, self._limits, router)
+        if not watched.vitals.stalls(source, now, self._limits, router):
+            watched.wait = None
+        elif self._may_only_wait(watched, now):
+            return
         if complaint:
             self._say(watched, "ill", complaint)
             self._pause(watched, now)
         elif now - watched.vitals.started_at > self._limits.settled:
             watched.failures = 0
+
+    def _may_only_wait(self, watched: Watched, now: float) -> bool:
+        """Whether a process that passes nothing on lacks processor time, as far as is known yet."""
+        if watched.wait is None:
+            watched.wait = ProcessorWait(watched.child.pid, now)
+        lacked = watched.wait.lacks
+        watched.wait.look(now)
+        if watched.wait.lacks and not lacked:
+            self._say(watched, "says", "passes no samples on for want of processor time")
+        patient = now - watched.wait.since < self._limits.patience
+        return patient and watched.wait.lacks is not False
 
     def _is_gone(self, watched: Watched, now: float) -> bool:
         """Whether the run before has ended; one that cannot be killed is tried again later."""

@@ -133,10 +133,21 @@ class Vitals:
             return f"not ready after {limits.start:g} s" if late else ""
         if now - self.heard_at > limits.silence:
             return f"hangs: silent for {limits.silence:g} s"
-        if source is not None and source.flows(now):
-            dry_since = max(self.advanced_at, self.ready_at, source.flowing_since)
-            if self.reads_device or router is None or not router.serves(now, limits):
-                dry_since = max(dry_since, self.waited_at)
-            if now - dry_since > limits.stall:
-                return f"takes no samples for {limits.stall:g} s while its source has them"
+        if self.stalls(source, now, limits, router):
+            return f"takes no samples for {limits.stall:g} s while its source has them"
         return ""
+
+    def stalls(
+        self,
+        source: "Vitals | None",
+        now: float,
+        limits: Limits,
+        router: "Vitals | None" = None,
+    ) -> bool:
+        """Whether it runs, and passes no samples on that its source has; see `complaint`."""
+        if source is None or not source.flows(now) or not self.ready:
+            return False
+        dry_since = max(self.advanced_at, self.ready_at, source.flowing_since)
+        if self.reads_device or router is None or not router.serves(now, limits):
+            dry_since = max(dry_since, self.waited_at)
+        return now - dry_since > limits.stall and now - self.heard_at <= limits.silence

@@ -6,7 +6,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -66,6 +67,22 @@ def supervise(
     return events
 
 
+CORE = min(os.sched_getaffinity(0))
+
+
+@contextmanager
+def busy_core(processes: int) -> Iterator[None]:
+    """So many processes that never rest, all on one core."""
+    spin = f"import os\nos.sched_setaffinity(0, {{{CORE}}})\nwhile True: pass"
+    started = [subprocess.Popen([sys.executable, "-c", spin]) for _ in range(processes)]
+    try:
+        yield
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
 def of_kind(events: list[ProcessEvent], process: str, kind: str) -> list[ProcessEvent]:
     return [event for event in events if (event.process, event.kind) == (process, kind)]
 
@@ -110,6 +127,23 @@ def test_only_a_process_whose_source_has_samples_is_started_again_for_having_non
     events = supervise(plans, lambda _, events: len(of_kind(events, "daq", "ill")) == 2)
     assert "takes no samples" in of_kind(events, "daq", "ill")[0].text
     assert not of_kind(events, "monitor", "ill")
+
+
+def test_a_process_that_only_waits_for_a_processor_is_not_started_again() -> None:
+    # Neither counts a sample; one of them spins behind four others on one core.
+    spins = "until = time.monotonic() + 0.1\n    while time.monotonic() < until: pass"
+    begins = WORKER.format(step=0).replace("time.sleep(0.02)", spins)
+    begins = f"import os\nos.sched_setaffinity(0, {{{CORE}}})\n{begins}"
+    plans = [
+        worker("plant"),
+        worker("daq", WORKER.format(step=0), source="plant"),
+        worker("recorder", begins, source="plant"),
+    ]
+    with busy_core(4):
+        events = supervise(plans, lambda _, events: len(of_kind(events, "daq", "ill")) == 2)
+    assert not of_kind(events, "recorder", "ill")
+    said = [event.text for event in of_kind(events, "recorder", "says")]
+    assert said[0] == "passes no samples on for want of processor time"
 
 
 def test_pauses_grow_and_the_reason_is_the_last_line_that_was_printed() -> None:
