@@ -88,6 +88,14 @@ def binding() -> Contact:
     return lambda t, x, v, h: -7.0 * abs(x - 0.02) * bristles.move(v * h)
 
 
+def binding_on(side: float) -> Contact:
+    """Bristles that touch on one side of a place only: above it for 1, below it for -1."""
+    bristles = Bent(0.004)
+    return lambda t, x, v, h: (
+        -0.4 * (1 + math.tanh(side * (x - 0.02) / 0.01)) * bristles.move(v * h)
+    )
+
+
 class Yielding:
     """A joint that yields gradually, and unloads along a straight line."""
 
@@ -113,5 +121,7 @@ PRESLIDING: dict[str, Callable[[], Contact]] = {
     "bliman_sorine_2": overshooting,
     "lugre": held_at_rest,
     "binding_with_memory": binding,
+    "binding_past_with_memory": lambda: binding_on(1.0),
+    "binding_before_with_memory": lambda: binding_on(-1.0),
 }
 """By the effect that describes them."""

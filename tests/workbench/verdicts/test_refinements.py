@@ -88,3 +88,35 @@ def test_presliding_and_centre_of_a_slide_that_binds_are_found(tmp_path: Path) -
     assert coarse.reason == "leaves much that binding_with_memory@load explains"
     # Rows know the refinement as they know each other.
     assert all(verdict.best.label in row.cosines for row in rows if row is not verdict.best)
+
+
+@kernel(allocates=True)
+def touched(u: np.ndarray, holds: float, steps: int, h: float) -> np.ndarray:
+    """The same machine; the contact bends as before, and touches above `CENTRE` only."""
+    out = np.zeros((u.size, 2))
+    x = v = s = z = 0.0
+    for n in range(u.size):
+        for j in range(steps):
+            gate = 1.0 / (1.0 + np.exp(-(x - CENTRE) / 5e-4))
+            a = s - 2.0 * v - 100.0 * x - holds * gate * z
+            if j == 0:
+                out[n, 0], out[n, 1] = x, a
+            v += h * a
+            x += h * v
+            z += h * (v - abs(v) * z) / REACH
+            s += h * 60.0 * (u[n] - s)
+    return out
+
+
+def test_presliding_of_a_slide_that_binds_on_one_side_is_found(tmp_path: Path) -> None:
+    logs = [run(seed, holds, machine=touched) for seed, holds in ((0, 0.6), (1, 0.6), (2, 0.0))]
+    made = studied(tmp_path, MODEL, logs[:1], logs[1:2], UNITS, rates=[RATE, RATE])
+
+    rows, verdict = ranking(open_bench(with_healthy(made, logs[2], UNITS, RATE)))
+
+    assert verdict.word == "missing_effect"
+    assert rows[0].label == "binding_past_with_memory@load"
+    assert rows[0].fitted is not None
+    values = rows[0].fitted.train.values()
+    assert abs(values["load_binding_past_with_memory_xb"] - CENTRE) < 2e-4
+    assert abs(values["load_binding_past_with_memory_Fb"] / 0.6 - 1) < 0.05
