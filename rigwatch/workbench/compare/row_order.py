@@ -50,11 +50,10 @@ def with_row_order(study: Study, data: Data) -> tuple[Study, Data]:
         return study, data
     own = data.of_healthy or data
     scale = scale_of_several(own.train)
-    before = fit_base(study, own, scale)
-    after = _fitted_with_next_rows(study, own, names, before, scale)
+    before, ordered = fit_base(study, own, scale), _ordered(study, own, names)
+    after = _fitted_again(study, ordered, before, scale)
     if after is None or not _much_better(before, after):
         return study, data
-    ordered = _ordered(study, own, names)
     if data.healthy is None and _explains_more_as_given(study, (own, before), (ordered, after)):
         return study, data
     source = RECORDINGS if data.healthy is None else HEALTHY
@@ -73,11 +72,11 @@ def _in_doubt(study: Study) -> list[str]:
     return [n for n in model.driving() if model.held(n) == "zero" and not model.inputs[n].late]
 
 
-def _fitted_with_next_rows(
-    study: Study, data: Data, names: list[str], before: Fitted, scale: FloatArray | None
+def _fitted_again(
+    study: Study, ordered: Data, before: Fitted, scale: FloatArray | None
 ) -> Fitted | None:
     """The fit with the rows put right; None if it fails."""
-    start, ordered = before.train.values(), _ordered(study, data, names)
+    start = before.train.values()
     try:
         return fit_model(study, ordered, before.placements, start, scale, base=before)
     except ModelError:

@@ -60,7 +60,7 @@ def test_what_grows_by_itself_is_followed_for_three_e_foldings(tmp_path: Path) -
     assert "a deviation that grows e-fold in 0.1 s" in chosen.horizon_from
 
 
-@pytest.mark.parametrize("seeds", [(0, 1), (2, 3)])
+@pytest.mark.parametrize("seeds", [pytest.param((0, 1), marks=pytest.mark.nightly), (2, 3)])
 def test_missing_drag_is_not_taken_for_an_earlier_torque(
     tmp_path: Path, seeds: tuple[int, int]
 ) -> None:

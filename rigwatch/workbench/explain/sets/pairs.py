@@ -92,7 +92,7 @@ def two_effects(
         good = _explaining(bench, fits, tolerant=tolerant)
     beside = [] if bench.study.model.rough else [fitted for _, fitted in fits]
     alone = acts_alone(bench.base, bench.floor, verdict, beside)
-    single = dataclasses.replace(verdict, alone=alone)
+    single = dataclasses.replace(verdict, alone=True) if alone else verdict
     if not good:
         return single
     best, together = min(good, key=lambda found: found[1].held_out_error)
