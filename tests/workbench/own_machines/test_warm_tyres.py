@@ -6,6 +6,7 @@ import numpy as np
 
 from rigwatch.workbench.explain.explain import explain
 from tests.workbench.machine import Table, studied
+from tests.workbench.simulated import knowing
 
 VAN = """
 name = "van"
@@ -30,6 +31,7 @@ kind = "sensor"
 signal = "speed"
 """
 UNITS = {"torque": "N m", "grade": "1", "speed": "m/s"}
+EFFECTS = ("drift", "coulomb", "viscous", "ac_coupling", "coulomb_running_in", "lag", "offset")
 RATE, SUBSTEPS, NOISE = 4.0, 5, 0.015
 MASS, ROLLING, COLD, WARMED, DRAG = 1240.0, 0.0108, 0.34, 140.0, 0.36
 
@@ -57,7 +59,8 @@ def driven(seed: int, seconds: float = 250.0) -> Table:
 
 def test_what_a_rarer_effect_explains_better_is_not_named(tmp_path: Path) -> None:
     tables = [driven(seed) for seed in range(3)]
-    found = explain(studied(tmp_path, VAN, tables[:2], tables[2:], UNITS, rates=[RATE] * 3))
+    study = studied(tmp_path, VAN, tables[:2], tables[2:], UNITS, rates=[RATE] * 3)
+    found = explain(knowing(study, *EFFECTS))
     assert (found.verdict, found.rivals) == ("undetermined", ["drift@speedometer"])
     assert found.ranking[0].effect == "coulomb_running_in"
     assert found.text.startswith("likely, not certain: coulomb_running_in@road is missing")
