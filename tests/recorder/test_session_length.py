@@ -48,11 +48,13 @@ class Days:
         self.source.send(samples)
         self.monitor.publish(ALARMS, alarm(self.alarms))
         self.alarms += 1
-        heard = self.recorder.feed._numbered["alarms"]
+        heard, reader = self.recorder.feed._numbered["alarms"], self.recorder.feed._reader
 
         def complete() -> bool:
             self.recorder.turn(self.now, time.time_ns())
-            return heard.positions().get("monitor", (0, -1))[1] == self.alarms - 1
+            alarms = heard.positions().get("monitor", (0, -1))[1]
+            sample = (reader.position or (0, -1))[1]
+            return (alarms, sample) == (self.alarms - 1, self.source.next - 1)
 
         eventually(complete, "all is recorded")
 
