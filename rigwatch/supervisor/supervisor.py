@@ -219,15 +219,16 @@ class Supervisor:
             return
         source, router = self._vitals_of(watched.child.plan.source), self._vitals_of("router")
         complaint = watched.vitals.complaint(source, now, self._limits, router)
-        if not watched.vitals.stalls(source, now, self._limits, router):
+        if not complaint:
             watched.wait = None
-        elif self._may_only_wait(watched, now):
+            if now - watched.vitals.started_at > self._limits.settled:
+                watched.failures = 0
             return
-        if complaint:
-            self._say(watched, "ill", complaint)
-            self._pause(watched, now)
-        elif now - watched.vitals.started_at > self._limits.settled:
-            watched.failures = 0
+        stalls = watched.vitals.stalls(source, now, self._limits, router)
+        if stalls and self._may_only_wait(watched, now):
+            return
+        self._say(watched, "ill", complaint)
+        self._pause(watched, now)
 
     def _may_only_wait(self, watched: Watched, now: float) -> bool:
         """Whether a process that passes nothing on lacks processor time, as far as is known yet."""

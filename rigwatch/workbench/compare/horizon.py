@@ -27,13 +27,7 @@ from rigwatch.physics.engine.score import autocorrelation, first_below
 from rigwatch.wire.arrays import BoolArray, ComplexArray, FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, predicts_along_motion, prepare, scale_of_several
-from rigwatch.workbench.fit import (
-    Fitted,
-    eigenvalues,
-    fit_base,
-    given_eigenvalues,
-    with_hold,
-)
+from rigwatch.workbench.fit import Fitted, eigenvalues, fit_base, given_eigenvalues, with_hold
 from rigwatch.workbench.study import Study
 
 SPANS = 3.0

@@ -225,8 +225,9 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
         return _with_rarer_tried(first, none)
     second = _explained_once(replace(bench, study=wider), progress, rows, first)
     found = second.explanation
-    better = found.verdict in STRENGTH_TOLD and _is_better(first, second)
-    if not (better or _speaks_against_named(first, second)):
+    named = found.verdict in STRENGTH_TOLD
+    better = named and _is_better(first, second)
+    if not (better or (named and _speaks_against_named(first, second))):
         return _with_rarer_tried(first, none)
     text, rivals = RARER.format(text=found.text, count=len(rarer)), found.rivals
     if not better:
@@ -262,7 +263,7 @@ def _speaks_against_named(first: Explained, second: Explained) -> bool:
     Clearly more: less than half of the energy above noise that it leaves.
     """
     before, after = first.explanation, second.explanation
-    if before.verdict != "missing_effect" or after.verdict not in STRENGTH_TOLD or before.beside:
+    if before.verdict != "missing_effect" or before.beside:
         return False
     label, alike = first.rows[0].label, [second.rows[0].label, *after.rivals]
     if after.verdict == "undetermined" and label in alike:

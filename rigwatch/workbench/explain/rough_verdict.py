@@ -56,14 +56,15 @@ above it; one of two hidden effects leaves 2.0 times and 6 %.
 """
 
 
-def much_left(base: Fitted, floor: NoiseFloor, fitted: Fitted) -> bool:
+def much_left(base: Fitted, floor: NoiseFloor, fitted: Fitted, most: float = SHARE) -> bool:
     """Whether the residual is so large that the fitted effects cannot be all that is missing.
 
     Samples at an effect's discontinuities do not count, see `discontinuities.py`, nor does the
-    model's own error along this motion, see `error_spectrum.py`.
+    model's own error along this motion, see `error_spectrum.py`. Of the error beyond that a share
+    of `most` may be left.
     """
     if floor.own_error is not None:
-        return floor.beyond_own_error(base.held_out, fitted.held_out, fitted.calm) > SHARE
+        return _beyond_own(base, floor, fitted) > most
     left, before = (floor.ratio(fit, fitted.calm) for fit in (fitted.held_out, base.held_out))
     return left > MUCH and left**2 - 1 > SHARE * (before**2 - 1)
 
@@ -73,10 +74,17 @@ def leaves_much(base: Fitted, floor: NoiseFloor, found: Verdict) -> bool:
     if found.word != "missing_effect" or found.second or found.best is None:
         return False
     fitted = found.best.fitted
-    if fitted is None or not much_left(base, floor, fitted):
-        return False
-    share = floor.beyond_own_error(base.held_out, fitted.held_out, fitted.calm)
-    return not (found.alone and share <= SHARE_ALONE)
+    return fitted is not None and much_left(base, floor, fitted, _allowed(found))
+
+
+def _allowed(found: Verdict) -> float:
+    """Share of the error beyond the model's own that the effect named may leave."""
+    return SHARE_ALONE if found.alone else SHARE
+
+
+def _beyond_own(base: Fitted, floor: NoiseFloor, fitted: Fitted) -> float:
+    """Share of the error beyond the model's own that a fit leaves."""
+    return floor.beyond_own_error(base.held_out, fitted.held_out, fitted.calm)
 
 
 def acts_alone(base: Fitted, floor: NoiseFloor, found: Verdict, beside: Sequence[Fitted]) -> bool:
@@ -89,9 +97,8 @@ def acts_alone(base: Fitted, floor: NoiseFloor, found: Verdict, beside: Sequence
     best = found.best.fitted if found.word == "missing_effect" and found.best else None
     if best is None or not beside or floor.own_error is None:
         return False
-    shares = [floor.beyond_own_error(base.held_out, one.held_out, one.calm) for one in beside]
-    alone = floor.beyond_own_error(base.held_out, best.held_out, best.calm)
-    return min(shares) > REMAINS * alone
+    least = min(_beyond_own(base, floor, one) for one in beside)
+    return least > REMAINS * _beyond_own(base, floor, best)
 
 
 def leaves_some(base: Fitted, floor: NoiseFloor, found: Verdict) -> bool:
@@ -151,8 +158,7 @@ def undetermined_if_much_left(base: Fitted, floor: NoiseFloor, found: Verdict) -
         of = "error on the healthy recording" if healthy else "noise floor"
         told = f"{left:.2f} times the {of}, expected at most {MUCH:g}"
     else:
-        share = floor.beyond_own_error(base.held_out, fitted.held_out, fitted.calm)
-        most = SHARE_ALONE if found.alone else SHARE
+        share, most = _beyond_own(base, floor, fitted), _allowed(found)
         told = f"{share:.1%} of the error beyond the model's own, expected at most {most:.0%}"
     text = f"{found.best.label} explains most, but leaves {told}: another effect may act as well"
     return replace(found, word="undetermined", text=text)
@@ -163,8 +169,7 @@ def _with_rest_told(base: Fitted, floor: NoiseFloor, found: Verdict) -> Verdict:
     fitted = found.best.fitted if found.alone and found.best else None
     if fitted is None or not much_left(base, floor, fitted):
         return found
-    share = floor.beyond_own_error(base.held_out, fitted.held_out, fitted.calm)
-    told = f"it leaves {share:.0%} of the error beyond the model's own"
+    told = f"it leaves {_beyond_own(base, floor, fitted):.0%} of the error beyond the model's own"
     return replace(found, text=f"{found.text}; {told}, and no second effect explains that")
 
 

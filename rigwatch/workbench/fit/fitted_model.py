@@ -446,8 +446,10 @@ def eigenvalues(fitted: Fitted, recording: Recording) -> ComplexArray:
     starts = windows(fitted.compiled.system, len(recording), fitted.horizon).starts[:LOOKED_AT]
     # Without states of its own a model has an initial state for each recording, and one window.
     initial = fitted.train.initial[: len(starts)]
-    parameters, substeps = fitted.train.parameters, fitted.substeps
-    return _eigenvalues(fitted.compiled, recording, starts, initial, parameters, substeps)
+    return _eigenvalues(
+        fitted.compiled, recording, starts,
+        initial=initial, parameters=fitted.train.parameters, substeps=fitted.substeps,
+    )  # fmt: skip
 
 
 def given_eigenvalues(study: Study, recording: Recording) -> ComplexArray:
@@ -459,15 +461,18 @@ def given_eigenvalues(study: Study, recording: Recording) -> ComplexArray:
     compiled = _compiled(study, placements_of(study, recording), start, recording.dt)
     every = max(len(recording) // LOOKED_AT, 2)
     starts = np.arange(0, len(recording) - 1, every, dtype=np.int64)[:LOOKED_AT]
-    parameters = compiled.vector(start)
-    initial = initial_states(compiled.system, recording)[starts]
-    return _eigenvalues(compiled, recording, starts, initial, parameters, study.file.substeps)
+    return _eigenvalues(
+        compiled, recording, starts,
+        initial=initial_states(compiled.system, recording)[starts],
+        parameters=compiled.vector(start), substeps=study.file.substeps,
+    )  # fmt: skip
 
 
-def _eigenvalues(  # noqa: PLR0917 -- they belong together
+def _eigenvalues(
     compiled: CompiledSystem,
     recording: Recording,
     starts: IntArray,
+    *,
     initial: FloatArray,
     parameters: FloatArray,
     substeps: int,

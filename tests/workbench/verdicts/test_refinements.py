@@ -36,13 +36,14 @@ CENTRE, REACH = 0.004, 2e-4
 
 
 @kernel(allocates=True)
-def slid(u: np.ndarray, binding: float, steps: int, h: float) -> np.ndarray:
+def _moved(u: np.ndarray, binding: float, steps: int, h: float, one_sided: bool) -> np.ndarray:
     """Position and acceleration at each sample; the force of the contact is bent over `REACH`."""
     out = np.zeros((u.size, 2))
     x = v = s = z = 0.0
     for n in range(u.size):
         for j in range(steps):
-            a = s - 2.0 * v - 100.0 * x - binding * abs(x - CENTRE) * z
+            touches = 1.0 / (1.0 + np.exp(-(x - CENTRE) / 5e-4)) if one_sided else abs(x - CENTRE)
+            a = s - 2.0 * v - 100.0 * x - binding * touches * z
             if j == 0:
                 out[n, 0], out[n, 1] = x, a
             v += h * a
@@ -50,6 +51,16 @@ def slid(u: np.ndarray, binding: float, steps: int, h: float) -> np.ndarray:
             z += h * (v - abs(v) * z) / REACH
             s += h * 60.0 * (u[n] - s)
     return out
+
+
+def slid(u: np.ndarray, binding: float, steps: int, h: float) -> np.ndarray:
+    """The contact is pressed the more the further from `CENTRE`."""
+    return _moved(u, binding, steps, h, False)
+
+
+def touched(u: np.ndarray, binding: float, steps: int, h: float) -> np.ndarray:
+    """The contact touches above `CENTRE` only."""
+    return _moved(u, binding, steps, h, True)
 
 
 Machine = Callable[[np.ndarray, float, int, float], np.ndarray]
@@ -88,24 +99,6 @@ def test_presliding_and_centre_of_a_slide_that_binds_are_found(tmp_path: Path) -
     assert coarse.reason == "leaves much that binding_with_memory@load explains"
     # Rows know the refinement as they know each other.
     assert all(verdict.best.label in row.cosines for row in rows if row is not verdict.best)
-
-
-@kernel(allocates=True)
-def touched(u: np.ndarray, holds: float, steps: int, h: float) -> np.ndarray:
-    """The same machine; the contact bends as before, and touches above `CENTRE` only."""
-    out = np.zeros((u.size, 2))
-    x = v = s = z = 0.0
-    for n in range(u.size):
-        for j in range(steps):
-            gate = 1.0 / (1.0 + np.exp(-(x - CENTRE) / 5e-4))
-            a = s - 2.0 * v - 100.0 * x - holds * gate * z
-            if j == 0:
-                out[n, 0], out[n, 1] = x, a
-            v += h * a
-            x += h * v
-            z += h * (v - abs(v) * z) / REACH
-            s += h * 60.0 * (u[n] - s)
-    return out
 
 
 def test_presliding_of_a_slide_that_binds_on_one_side_is_found(tmp_path: Path) -> None:

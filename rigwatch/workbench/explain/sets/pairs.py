@@ -90,18 +90,22 @@ def two_effects(
     if fits and not good:
         rows, fits = _refined(bench, rows, fits, progress)
         good = _explaining(bench, fits, tolerant=tolerant)
-    beside = [] if bench.study.model.rough else [fitted for _, fitted in fits]
-    alone = acts_alone(bench.base, bench.floor, verdict, beside)
-    single = dataclasses.replace(verdict, alone=True) if alone else verdict
     if not good:
-        return single
+        return _single(bench, verdict, fits)
     best, together = min(good, key=lambda found: found[1].held_out_error)
     first = _verdict_with(bench, rows, fits, best.other, best.one)
     second = _verdict_with(bench, rows, fits, best.one, best.other)
     if first is None or second is None:
-        return single
+        return _single(bench, verdict, fits)
     found = _both_named(bench, first, second, together)
     return dataclasses.replace(found, best=_row(rows, found.best))
+
+
+def _single(bench: Bench, verdict: Verdict, fits: Sequence[tuple[Pair, Fitted]]) -> Verdict:
+    """The verdict on single effects, that no pair replaces."""
+    beside = [] if bench.study.model.rough else [fitted for _, fitted in fits]
+    alone = acts_alone(bench.base, bench.floor, verdict, beside)
+    return dataclasses.replace(verdict, alone=True) if alone else verdict
 
 
 def likely_pairs(bench: Bench, rows: Sequence[Ranked]) -> list[Pair]:
