@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import sympy
 
+from rigwatch.physics.engine.compile.derivatives import derivative
 from rigwatch.physics.engine.compile.llvm import Function, machine_code
 from rigwatch.physics.engine.compile.static_kernel import numpy_function
 from rigwatch.physics.engine.equations.expression import parse
@@ -62,6 +63,30 @@ def test_conditions_can_be_joined_and_turned_round():
     a, b, c = POINTS.T
     expected = np.where(((a > 0) & (b < 1)) | ~(c >= 2), a - b, c)
     np.testing.assert_array_equal(machine(expression)(POINTS), expected)
+
+
+LIMITED = "max(min(where(x > v, x, -x) + where(v > k, v, -v), k), -k)"
+
+
+@pytest.mark.parametrize("name", ["x", "v", "k"])
+def test_the_slope_of_a_limit_is_a_step_and_makes_no_further_choices(name):
+    limited = parse(LIMITED, SYMBOLS, "test")
+    slope = derivative(limited, symbol(name))
+    # SymPy folds a choice whose condition has choices, which takes it minutes where these are many.
+    assert slope.atoms(sympy.Piecewise) <= limited.atoms(sympy.Piecewise) | choices_of_slopes(name)
+    at = np.array([[1.3, 0.4, 2.2], [0.2, 0.9, 0.8], [-2.0, 3.0, 1.5], [0.3, -0.2, 0.1]])
+    step = 1e-6 * np.eye(3)[NAMES.index(name)]
+    value = machine(limited)
+    expected = (value(at + step) - value(at - step)) / 2e-6
+    np.testing.assert_allclose(machine(slope)(at), expected, atol=1e-8)
+    arrays = numpy_function([*NAMES, "t"], slope)(*at.T, 0.7)
+    np.testing.assert_allclose(arrays, expected, atol=1e-8)
+
+
+def choices_of_slopes(name):
+    """The slopes of the choices that a limit limits."""
+    inner = parse("where(x > v, x, -x) + where(v > k, v, -v)", SYMBOLS, "test")
+    return derivative(inner, symbol(name)).atoms(sympy.Piecewise)
 
 
 def test_numbers_that_are_none_stay_none():

@@ -94,11 +94,12 @@ def _by_rules(expression: sympy.Expr, by: sympy.Symbol) -> sympy.Expr:
     slope = slope.replace(
         _is_of_ended_root, lambda root: sympy.Piecewise((root, root.base > 0), (0, True))
     )
-    # A jump's impulse has no value at a sample, and a step needs one at zero.
+    # A jump's impulse has no value at a sample, and a step needs one at zero. A choice in its place
+    # would be folded with those in its argument, which takes SymPy minutes.
     if not slope.has(sympy.DiracDelta, sympy.Heaviside):
         return slope
     slope = slope.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
-    return slope.replace(sympy.Heaviside, lambda at, *_: sympy.Piecewise((1, at > 0), (0, True)))
+    return slope.replace(sympy.Heaviside, lambda at, *_: sympy.Heaviside(at, 0))
 
 
 def _is_of_ended_root(term: sympy.Expr) -> bool:

@@ -158,6 +158,8 @@ class Function:
             return self._extreme("ogt" if isinstance(e, sympy.Max) else "olt", e.args)
         if isinstance(e, sympy.Piecewise):
             return self._choice(e)
+        if isinstance(e, sympy.Heaviside):
+            return self._step(e)
         return self._function(e)
 
     def _folded(self, operation: str, terms: Sequence[sympy.Basic]) -> str:
@@ -207,6 +209,10 @@ class Function:
             else:
                 found = self._selected(self._condition(condition), self.value(value), found)
         return found
+
+    def _step(self, e: sympy.Heaviside) -> str:
+        positive = self._compared("ogt", self.value(e.args[0]), literal(0.0))
+        return self._selected(positive, literal(1.0), literal(0.0))
 
     def _condition(self, e: sympy.Basic) -> str:
         if e in self._values:

@@ -65,6 +65,9 @@ class _Printer(NumPyPrinter):  # type: ignore[misc]
         condition, one, other = map(self._print, expr.args)
         return f"where({condition}, {one}, {other})"
 
+    def _print_Heaviside(self, expr: sympy.Expr) -> str:  # noqa: N802 -- SymPy's name
+        return f"where({self._print(expr.args[0])} > 0, 1.0, 0.0)"
+
     def _print_Piecewise(self, expr: sympy.Expr) -> str:  # noqa: N802 -- SymPy's name
         *choices, last = expr.args
         text = self._print(last.expr) if last.cond == sympy.true else "nan"
