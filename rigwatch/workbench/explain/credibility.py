@@ -2,7 +2,9 @@
 
 An effect is credible only if it is clearly stronger than its apparent strength when healthy. Model
 error mimics a little of every effect on a healthy recording; the apparent strength of an effect
-there, to first order, is the part that model error can account for.
+there, to first order, is the part that model error can account for. Of a free run that is asked
+where the model leaves no more than on the healthy recording and the effect explains little of it:
+what explains most of it is named, also where the healthy machine has it.
 
 What `add` refused in the study's present state is not named as missing: there the study was fitted
 anew with the effect, and lost what a single fit had gained.
@@ -19,11 +21,14 @@ from rigwatch.workbench.compare import Bench, apparent_strength
 from rigwatch.workbench.data import RESAMPLED
 from rigwatch.workbench.explain.remaining_error import LITTLE
 from rigwatch.workbench.explain.verdict import Verdict, judge
+from rigwatch.workbench.fit import Fitted
 from rigwatch.workbench.ranking import Ranked
 from rigwatch.workbench.study import Refusals, refused_as
 
 STRONGER = 3.0
 """Smallest ratio of an effect's strength to its apparent strength on the healthy recording."""
+MOST = 0.5
+"""Share of the error's energy that an effect leaves from which it explains little of it."""
 RESAMPLED_HELD = (
     "so little may be what resampling makes of a held input, which then changes between samples:"
     " log all recordings at one rate, or leave out what asks for one (rate, thin, period)"
@@ -88,9 +93,17 @@ def still_holds(word: str, label: str, beside: Sequence[str], refused: Refusals)
 def apparent_when_healthy(bench: Bench, row: Ranked) -> bool:
     """Whether the effect appears nearly as strong on the healthy recording."""
     healthy = bench.data.of_healthy
-    if healthy is None or bench.bare is None or not healthy.along_motion or row.fitted is None:
+    if healthy is None or bench.bare is None or row.fitted is None:
+        return False
+    if not (healthy.along_motion or _explains_little_of_healthy_error(bench, row.fitted)):
         return False
     p = row.placement.effect.parameters[row.placement.effect.strength]
     value = row.fitted.train.values()[row.placement.prefix + row.placement.effect.strength]
     seems = apparent_strength(healthy, bench.bare, row.placement, row.fitted)
     return abs(value - p.neutral) < STRONGER * abs(seems)
+
+
+def _explains_little_of_healthy_error(bench: Bench, fitted: Fitted) -> bool:
+    """Whether the model leaves no more than on the healthy recording, and an effect most of it."""
+    share = (fitted.held_out_error / bench.base.held_out_error) ** 2
+    return bench.floor.reached(bench.base.held_out) and share > MOST

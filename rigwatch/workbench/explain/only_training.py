@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rigwatch.workbench.compare import Bench
+from rigwatch.workbench.explain.credibility import apparent_when_healthy
 from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.fit import Fitted
 from rigwatch.workbench.ranking import MATERIAL, Ranked
@@ -31,8 +32,14 @@ def undetermined_if_training_asks(
         rows: the ranking that the verdict is on.
         verdict: of which only `nothing_missing` may change.
     """
+    if verdict.word != "nothing_missing":
+        return verdict
     row = asked_by_training(bench.base, rows)
-    if verdict.word != "nothing_missing" or row is None:
+    # What the healthy recording shows as strongly is not missing since.
+    while row is not None and apparent_when_healthy(bench, row):
+        rows = [other for other in rows if other is not row]
+        row = asked_by_training(bench.base, rows)
+    if row is None:
         return verdict
     text = verdict.text + _in_words(bench.base, row)
     if bench.data.along_motion or bench.study.model.rough or bench.base.placements:

@@ -24,6 +24,7 @@ from rigwatch.workbench.ranking.refitting import (
     no_progress,
     own_floor,
     refit,
+    refit_all,
     refit_elsewhere,
     refit_from_given,
 )
@@ -89,10 +90,15 @@ def rank(
     for other in _elsewhere(study, data, rows, floor):
         progress(f"fitting {other.label}, as the best may act there")
         refit(study, data, base, other, fit_from(in_order(rows)[0].fitted))
-    for other in _simpler_or_equal(study, data, rows, floor):
-        progress(f"fitting {other.label}, as the best at its port leaves more than noise")
-        refit(study, data, base, other, fit_model)
+    rest = _simpler_or_equal(study, data, rows, floor)
+    _tell(progress, rest, "as the best at its port leaves more than noise")
+    refit_all(study, data, base, rest, fit_model)
     return in_order(rows)
+
+
+def _tell(progress: Progress, rows: Sequence[Ranked], why: str) -> None:
+    for row in rows:
+        progress(f"fitting {row.label}, {why}")
 
 
 def _begin_again(  # noqa: PLR0917 -- they belong together
@@ -167,12 +173,12 @@ def _fit_skipped(  # noqa: PLR0917 -- they belong together
     while spare := _substitute_of_vague(rows):
         progress(f"fitting {spare.label}, as the strength of the effect it resembles is open")
         refit(study, data, base, spare, fit_model)
-    for spare in _substitutes_of_refused(base, rows):
-        progress(f"fitting {spare.label}, as the effect it resembles is refused")
-        refit(study, data, base, spare, fit_model)
-    for spare in _skipped_for_far_worse(rows):
-        progress(f"fitting {spare.label}, as what it resembles leaves far more than the best")
-        refit(study, data, base, spare, fit_model)
+    spares = _substitutes_of_refused(base, rows)
+    _tell(progress, spares, "as the effect it resembles is refused")
+    refit_all(study, data, base, spares, fit_model)
+    spares = _skipped_for_far_worse(rows)
+    _tell(progress, spares, "as what it resembles leaves far more than the best")
+    refit_all(study, data, base, spares, fit_model)
 
 
 def _skipped_for_far_worse(rows: Sequence[Ranked]) -> list[Ranked]:
