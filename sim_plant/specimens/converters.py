@@ -49,6 +49,7 @@ DRIVES: dict[str, Callable[[], Drive]] = {
     "asymmetry": lambda: lambda t, u: 1.1 * u if u > 0 else 0.9 * u,
     "gain_drift": lambda: lambda t, u: (1 + 0.03 * t) * u,
     "rate_limit": lambda: Follower(60.0),
+    "slew_limit": lambda: Follower(60.0),
     "valve_hysteresis": lambda: Dragged(0.3),
 }
 """A force constant that falls as the iron fills, edges of a valve, amplifiers."""

@@ -58,6 +58,9 @@ LITTLE_MORE = 0.01
 within a family it is `MATERIAL`."""
 CHANCE = 0.05
 """p-value of the best effect from which coloured noise explains the error as well."""
+SLIGHT = 0.01
+"""Share of the error's energy above the floor that a finer law of the same physics must explain
+beyond a simpler one to be named in place of it."""
 MOST_OF_IT = 0.75
 """Share of the best effect's gain that an effect of lower order needs to be named instead."""
 
@@ -281,7 +284,7 @@ def _named(base: Fitted, accepted: Sequence[Ranked], floor: NoiseFloor) -> Ranke
     only if its residual is at the noise floor, or if it alone explains the error.
     """
     top = lowest(accepted)
-    equals = [row for row in accepted if _as_good(top, row, floor)]
+    equals = [row for row in accepted if _as_good(base, top, row, floor)]
     least = min(map(_simplicity, equals))
     best = lowest([row for row in equals if _simplicity(row) == least])
     assert best.fitted is not None
@@ -332,15 +335,24 @@ def _simplicity(row: Ranked) -> tuple[int, bool]:
     return row.free, row.placement.effect.sampled
 
 
-def _as_good(top: Ranked, row: Ranked, floor: NoiseFloor) -> bool:
+def _as_good(base: Fitted, top: Ranked, row: Ranked, floor: NoiseFloor) -> bool:
     """Whether a row is as good as the one with the smallest held-out error.
 
     Above the noise floor a slightly smaller error does not justify a further parameter. Within one
-    family that parameter refines the physics, and has to lower the error as much as an effect has.
+    family that parameter refines the physics, and has to lower the error as much as an effect has:
+    a short bending of the contact follows any rounding of the corner of dry friction.
     """
     assert top.fitted is not None
     if row is top or equal(top, row, 0.0):
         return True
+    if same_family(top, row) and row.free < top.free and _gains_little(base, top, row, floor):
+        return True
     margin = MATERIAL if same_family(top, row) else LITTLE_MORE
     little = (1 - margin) * error_ratio(top, row) <= 1.0
     return row.free < top.free and little and not floor.reached(top.fitted.held_out)
+
+
+def _gains_little(base: Fitted, top: Ranked, row: Ranked, floor: NoiseFloor) -> bool:
+    """Whether the best explains hardly more of the error above the floor than another row."""
+    left = [floor.left_over(base.held_out, r.fitted.held_out) for r in (top, row) if r.fitted]
+    return left[-1] - left[0] < SLIGHT

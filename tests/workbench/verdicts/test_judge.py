@@ -126,7 +126,7 @@ def test_what_only_the_training_asks_for_is_undetermined_where_nothing_held_out_
     refused.p_value = p_value
     bench: Any = SimpleNamespace(
         base=replace(base(1.1), placements=(refused.placement,) if later else ()),
-        data=SimpleNamespace(along_motion=along),
+        data=SimpleNamespace(along_motion=along, of_healthy=None),
         study=SimpleNamespace(model=SimpleNamespace(rough=False)),
     )
     held_out = judge(bench.base, [refused], PERIODS)

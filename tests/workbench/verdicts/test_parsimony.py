@@ -47,7 +47,7 @@ BRITTLE = effect("brittle", "-tanh(v/w)*(1 - sqrt(1 - 2*F/G))*G", F=STRENGTH, w=
 
 
 def test_what_looks_like_an_effect_that_cannot_be_fitted_is_fitted_instead(tmp_path: Path) -> None:
-    found = explain(damper(tmp_path, rough, BRITTLE))
+    found = explain(damper(tmp_path, lambda _, v: 4 * np.sign(v), BRITTLE))
     rows = {row.effect: row for row in found.ranking}
     assert rows["brittle"].reason == "cannot be fitted"
     assert found.ranking[0].effect == "coulomb"

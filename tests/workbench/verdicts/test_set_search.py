@@ -73,7 +73,7 @@ def test_what_was_skipped_for_an_effect_of_open_strength_is_fitted_at_its_port()
 
 
 def test_an_effect_of_a_set_is_compared_though_it_looks_like_another(tmp_path: Path) -> None:
-    study = damper(tmp_path, lambda x, v: 4 * np.tanh(v / 0.002) + 2e6 * x**3)
+    study = damper(tmp_path, lambda x, v: 4 * np.sign(v) + 2e6 * x**3 + 2.0)
     bench = open_bench(study)
     stiffer = {row.label: row for row in rank(study, bench.data, bench.base, bench.floor)}
     rest = Combination((stiffer["cubic_stiffness@load"],))
@@ -118,7 +118,7 @@ def test_what_was_skipped_for_an_effect_that_may_be_named_in_place_of_the_best_i
 def test_a_needless_effect_is_left_out_of_a_set_before_the_others_are_judged(
     tmp_path: Path,
 ) -> None:
-    study = damper(tmp_path, lambda x, v: 4 * np.tanh(v / 0.002) + 2e6 * x**3)
+    study = damper(tmp_path, lambda x, v: 4 * np.sign(v) + 2e6 * x**3 + 2.0)
     bench = open_bench(study)
     rows = list[Ranked]()
     for label in ("cubic_stiffness@load", "coulomb@load", "quadratic_drag@load"):
@@ -154,7 +154,7 @@ def test_a_second_pass_extends_the_sets_of_the_first_by_rarer_effects(tmp_path: 
 
 @pytest.mark.nightly
 def test_a_set_that_a_second_pass_makes_once_more_is_fitted_once(tmp_path: Path) -> None:
-    bench = open_bench(damper(tmp_path, lambda x, v: 4 * np.tanh(v / 0.002) + 2e6 * x**3))
+    bench = open_bench(damper(tmp_path, lambda x, v: 4 * np.sign(v) + 2e6 * x**3 + 2.0))
     rows = {row.label: row for row in rank(bench.study, bench.data, bench.base, bench.floor)}
     stiffer = Combination((rows["cubic_stiffness@load"],))
 

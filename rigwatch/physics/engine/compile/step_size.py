@@ -83,7 +83,7 @@ def pace(system: System) -> Pace:
     others = [n for n in system.states if n not in {*system.model.states, *memory}]
     asked += [
         slope / (CONSTANT if _is_constant(system, slope) else allowed)
-        for slope in _returns(system, others)
+        for slope in (*_returns(system, others), *_unlimited(system, others))
     ]
     bounded = [
         sympy.Min(abs(slope), abs(system.derivatives[name]) / SLIPPING, evaluate=False) / allowed
@@ -177,6 +177,15 @@ def _returns(system: System, memory: Sequence[str]) -> Sequence[sympy.Expr]:
     every = [name for name in system.states if name not in system.model.states]
     sides = [{symbol(name): side for name in every} for side in (FILLED, -FILLED)]
     return list(dict.fromkeys(s.xreplace(full) for s in slopes for full in sides if s != 0))
+
+
+def _unlimited(system: System, names: Sequence[str]) -> Sequence[sympy.Expr]:
+    """The same where no limit of the rate is reached: what is limited at both ends of an interval
+    may arrive within it."""
+    slopes = [derivative(system.derivatives[name], symbol(name)) for name in names]
+    limited = [s for s in slopes if s.has(sympy.Heaviside)]
+    lifted = (s.replace(sympy.Heaviside, lambda *_: sympy.Integer(1)) for s in limited)
+    return list(dict.fromkeys(slope for slope in lifted if slope != 0))
 
 
 def _is_constant(system: System, slope: sympy.Expr) -> bool:
