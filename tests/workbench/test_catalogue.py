@@ -80,6 +80,24 @@ def test_a_pressure_in_pascal_is_seen_in_a_position_and_what_it_does_not_move_is
     assert model_report(parse(CYLINDER, Model, "cylinder"), {}).unseen == ("oil",)
 
 
+VESSEL = """
+name = "gas"
+summary = "A vessel that empties through a valve."
+inputs.flow = { unit = "1/s" }
+states.p = { unit = "Pa", derivative = "-flow*pa**2/p", measured = "pressure" }
+parameters.pa = { value = 1e5, unit = "Pa", fixed = true, low = 8e4, high = 1.1e5 }
+outputs.pressure = { unit = "Pa", expression = "p" }
+"""
+
+
+def test_a_run_that_diverges_tells_what_it_began_with() -> None:
+    model = parse(VESSEL, Model, "gas")
+    trouble = "the run diverged from p = 0 (`start` gives another): found NaN or infinite values"
+    assert model_report(model, {}).trouble.startswith(trouble)
+    begun = VESSEL.replace('measured = "pressure"', 'measured = "pressure", start = 6e5')
+    assert not model_report(parse(begun, Model, "gas"), {"flow": 1e-3}).trouble
+
+
 SURROUNDED = """
 name = "surrounded"
 summary = "A block that cools to its surroundings."

@@ -13,8 +13,9 @@ def add_log_columns(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="CHANNEL=COLUMN[UNIT]",
         help=(
-            "a channel, its column and the column's unit, [1] if it has none; also"
-            " COLUMN*FACTOR+OFFSET[UNIT], with the unit of the result"
+            "a channel, its column and the column's unit, [1] if it has none; a header with a"
+            " unit as it stands, 'force=F [kN]'; also COLUMN*FACTOR+OFFSET[UNIT], with the unit of"
+            " the result"
         ),
     )
     parser.add_argument("--time", metavar="COLUMN[UNIT]", help="time column")

@@ -123,8 +123,7 @@ def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> 
         if np.isfinite(outputs).all() and np.isfinite(slopes).all():
             break
     else:
-        trouble = "the run diverged (NaN or infinite), expected other starts, parameters or inputs"
-        return replace(told, trouble=trouble)
+        return replace(told, trouble=_diverged(model))
     curves = tuple(
         Curve(
             "time [s]", f"{name} [{own.shown or own.unit}]", time, _shown(own, outputs[:, column])
@@ -134,6 +133,14 @@ def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> 
     unseen, tied = _observed(list(model.states), slopes)
     growing = _growing(list(model.states), by_states)
     return replace(told, unseen=unseen, tied=tied, growing=growing, inputs=given, run=curves)
+
+
+def _diverged(model: Model) -> str:
+    """That a run does not stay finite, and the states that begin at zero, in words."""
+    zero = [name for name, state in model.states.items() if state.start == 0.0]
+    begun = f" from {' = '.join(zero)} = 0 (`start` gives another)" if zero else ""
+    more = "other starts, parameters or inputs"
+    return f"the run diverged{begun}: found NaN or infinite values, expected {more}"
 
 
 def inputs_of_run(model: Model, report: ModelReport) -> str:

@@ -345,7 +345,7 @@ def _given(
     text: str, channel: str, signal: Input | Output, headers: Sequence[Header]
 ) -> tuple[str, list[str]]:
     """A column as the user maps it, with 1/min read as rpm where the model has an angle."""
-    header = next((header for header in headers if header.column == text.strip()), None)
+    header = _header_typed(text.strip(), headers)
     if header is not None and header.units:
         own, told = _unit(header, channel, signal)
         return f"{header.column}[{own}]", told
@@ -356,6 +356,16 @@ def _given(
     if not turns:
         return text, []
     return f"{text[: unit.start()]}[{turns}]", [f"{text}: {unit[1]} is read as {turns}"]
+
+
+def _header_typed(text: str, headers: Sequence[Header]) -> Header | None:
+    """The header that is typed as it stands, or but for the blanks in front of its unit."""
+    verbatim = {header.column: header for header in headers}
+    without_unit = text.rpartition("[")[0].strip()
+    if text in verbatim or without_unit in verbatim:
+        return verbatim.get(text)
+    packed = "".join(text.split())
+    return next((h for h in headers if "".join(h.column.split()) == packed), None)
 
 
 def _no_unit(header: Header, option: str) -> str:

@@ -87,6 +87,7 @@ def test_a_unit_that_is_not_known_is_asked_for(tmp_path, run, capsys):
         pytest.param("Speed [min-1]", (), id="with a negative power"),
         pytest.param("n", ("--map", "speed=n[1/min]"), id="of the option"),
         pytest.param("n [1/min]", ("--map", "speed=n [1/min]"), id="of a header that is named"),
+        pytest.param("n [1/min]", ("--map", "speed=n[1/min]"), id="named without its blank"),
     ],
 )
 def test_turns_a_minute_are_no_angles_a_minute(tmp_path, run, capsys, header, more):
