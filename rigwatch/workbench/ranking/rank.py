@@ -35,6 +35,8 @@ from rigwatch.workbench.study import Study
 AGAIN = 0.25
 """Share of the energy above the floor that an effect must explain, to first order, to be fitted
 again if its fit may have ended in a local minimum."""
+MOST_OF_IT = 0.75
+"""Share of the residual's energy to first order from which a refused effect is not what it seems."""
 MUCH_WORSE = 1.5
 """Ratio of held-out errors too large to be caused by other missing physics favouring one effect.
 
@@ -277,14 +279,14 @@ def _substitute_of_vague(rows: Sequence[Ranked]) -> Ranked | None:
 
 
 def _substitutes_of_refused(base: Fitted, rows: Sequence[Ranked]) -> list[Ranked]:
-    """Rows skipped for refused ones, of a model whose hidden states continue through the windows.
+    """Rows skipped for refused ones that do not stand for them.
 
     Scores find two directions alike if hidden states begin anew in each window; what they do to
-    states that continue may differ.
+    states that continue may differ. And what explains most of the residual to first order and
+    nothing of it when fitted is not what it looks like: a finite strength does something else.
     """
-    if not base.train.continued:
-        return []
-    refused = {row.label for row in rows if row.fitted is not None and not row.accepted}
+    fitted = [row for row in rows if row.fitted is not None and not row.accepted]
+    refused = {row.label for row in fitted if base.train.continued or row.explained > MOST_OF_IT}
     waiting = [row for row in rows if row.fitted is None and not row.failure]
     return [r for r in waiting if r.fitted_instead in refused and _may_be_it(r)]
 

@@ -16,7 +16,11 @@ from rigwatch.workbench.explain.sets.combinations import _substitutes
 from rigwatch.workbench.explain.sets.enlarging import all_fitted, all_tried, scored_with
 from rigwatch.workbench.explain.sets.several_effects import _judge_each, _ranked_with
 from rigwatch.workbench.ranking import candidates, no_progress, rank, refit, scored
-from rigwatch.workbench.ranking.rank import _substitute_of_vague, _unfitted_similar
+from rigwatch.workbench.ranking.rank import (
+    _substitute_of_vague,
+    _substitutes_of_refused,
+    _unfitted_similar,
+)
 from rigwatch.workbench.ranking.ranked import Ranked
 from tests.workbench.dampers import damper
 
@@ -70,6 +74,19 @@ def test_what_was_skipped_for_an_effect_of_open_strength_is_fitted_at_its_port()
     assert _substitute_of_vague(every) is radiation
     radiation.failure = "diverges"
     assert _substitute_of_vague(every) is None
+
+
+@pytest.mark.parametrize(("explained", "tried"), [(0.99, True), (0.3, False)])
+def test_what_was_skipped_for_an_effect_that_explains_most_only_to_first_order_is_fitted(
+    explained: float, *, tried: bool
+) -> None:
+    base: Any = SimpleNamespace(train=SimpleNamespace(continued=False))
+    limit, lag = effect("slew_limit@drive"), effect("lag@drive")
+    limit.fitted, limit.explained, lag.fitted_instead = base, explained, "slew_limit@drive"
+    lag.likely = True
+    assert _substitutes_of_refused(base, [limit, lag]) == ([lag] if tried else [])
+    limit.accepted = True
+    assert _substitutes_of_refused(base, [limit, lag]) == []
 
 
 def test_an_effect_of_a_set_is_compared_though_it_looks_like_another(tmp_path: Path) -> None:
