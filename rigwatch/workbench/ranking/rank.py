@@ -36,7 +36,7 @@ AGAIN = 0.25
 """Share of the energy above the floor that an effect must explain, to first order, to be fitted
 again if its fit may have ended in a local minimum."""
 MOST_OF_IT = 0.75
-"""Share of the residual's energy to first order from which a refused effect is not what it seems."""
+"""Share of the residual, to first order, from which a refused effect is not what it seems."""
 MUCH_WORSE = 1.5
 """Ratio of held-out errors too large to be caused by other missing physics favouring one effect.
 
