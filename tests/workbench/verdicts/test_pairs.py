@@ -7,6 +7,7 @@ import pytest
 
 from rigwatch.physics.engine.compile import all_cores, turns
 from rigwatch.workbench.explain.explain import _by_pairs, ranking
+from rigwatch.workbench.explain.sets import pairs
 from rigwatch.workbench.explain.sets.pairs import Pair, _pair, likely_pairs, two_effects
 from rigwatch.workbench.explain.verdict import judge
 from rigwatch.workbench.ranking import refitting
@@ -109,6 +110,26 @@ def test_a_pair_that_leaves_more_than_noise_is_not_named(bench, rows):
     alone = judge(bench.base, rows, bench.floor)
     others = [row for row in rows if row.label not in PAIR]
     assert two_effects(bench, others, alone, no_progress) is alone
+
+
+def test_a_pair_whose_effects_are_not_named_beside_each_other_gives_way_to_the_next(
+    bench, rows, monkeypatch
+):
+    alone, by_label = judge(bench.base, rows, bench.floor), {row.label: row for row in rows}
+    right = likely_pairs(bench, rows)[0]
+    other = next(row for row in rows if row.label not in PAIR and row.fitted is not None)
+    finer = Pair(by_label["cubic_stiffness@load"], other, right.explained, right.start)
+    ((_, fit),) = pairs._fitted(bench, [right], no_progress)
+    monkeypatch.setattr(pairs, "_fitted", lambda *_: [(finer, fit), (right, fit)])
+    found = two_effects(bench, rows, alone, no_progress)
+    assert {found.members[0], found.second[0]} == set(PAIR)
+
+
+def test_no_pair_is_named_where_one_effect_acts_alone(bench, rows, monkeypatch):
+    alone = judge(bench.base, rows, bench.floor)
+    monkeypatch.setattr(pairs, "acts_alone", lambda *_: True)
+    found = two_effects(bench, rows, alone, no_progress)
+    assert found == dataclasses.replace(alone, alone=True)
 
 
 def along_motion(bench, times):

@@ -86,19 +86,21 @@ def two_effects(
         tolerant: whether a pair along the measured motion may leave more than the noise floor.
     """
     fits = _fitted(bench, likely_pairs(bench, rows), progress)
+    alone = _single(bench, verdict, fits)
+    if alone.alone:
+        return alone
     good = _explaining(bench, fits, tolerant=tolerant)
     if fits and not good:
         rows, fits = _refined(bench, rows, fits, progress)
         good = _explaining(bench, fits, tolerant=tolerant)
-    if not good:
-        return _single(bench, verdict, fits)
-    best, together = min(good, key=lambda found: found[1].held_out_error)
-    first = _verdict_with(bench, rows, fits, best.other, best.one)
-    second = _verdict_with(bench, rows, fits, best.one, best.other)
-    if first is None or second is None:
-        return _single(bench, verdict, fits)
-    found = _both_named(bench, first, second, together)
-    return dataclasses.replace(found, best=_row(rows, found.best))
+    # Of a pair with a finer law than is named beside the other effect, the plain one is in another.
+    for best, together in sorted(good, key=lambda found: found[1].held_out_error):
+        first = _verdict_with(bench, rows, fits, best.other, best.one)
+        second = _verdict_with(bench, rows, fits, best.one, best.other)
+        if first is not None and second is not None:
+            found = _both_named(bench, first, second, together)
+            return dataclasses.replace(found, best=_row(rows, found.best))
+    return _single(bench, verdict, fits)
 
 
 def _single(bench: Bench, verdict: Verdict, fits: Sequence[tuple[Pair, Fitted]]) -> Verdict:
