@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from msgspec import structs
 
 from monitor.diagnosis.observed_change import Evidence, ObservedChange, model_error
 from monitor.diagnosis.rig_ports import RigPorts, rig_ports
@@ -38,6 +39,10 @@ from rigwatch.physics.engine.score import (
 )
 from rigwatch.wire.arrays import FloatArray
 
+DRY_FRICTION = "dry friction"
+SHORTEST = 1 / 60
+"""Way to slip, relative to the motion, below which a change of seconds tells no law of dry friction
+from Coulomb's."""
 LEVEL = 0.01
 """Corrected p-value above which no candidate is named."""
 EXPLAINED = 0.5
@@ -120,9 +125,24 @@ def _candidates(ports: RigPorts, effects: Mapping[str, Effect], model: RigModel)
     def effect_at(name: str, port: str) -> Effect | None:
         effect, place = effects[name], places[port]
         stands = effect.fits(place.kind) and has_variables(effect, place)
-        return effect.scaled(sizes[port]) if stands else None
+        return _not_too_short(effect).scaled(sizes[port]) if stands else None
 
     return candidates(places, effects, effect_at)
+
+
+def _not_too_short(effect: Effect) -> Effect:
+    """The effect; of a law of dry friction with no shorter way to slip than a change tells."""
+    if effect.family != DRY_FRICTION:
+        return effect
+    bounded = {
+        name: structs.replace(p, low=max(p.low, SHORTEST))
+        if p.scale == "x"
+        else structs.replace(p, high=min(p.high, 1 / SHORTEST))
+        if p.scale == "1/x"
+        else p
+        for name, p in effect.parameters.items()
+    }
+    return structs.replace(effect, parameters=bounded)
 
 
 def _sizes(port: Port, columns: Mapping[str, FloatArray], dt: float) -> dict[str, float]:

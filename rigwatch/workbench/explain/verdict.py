@@ -58,7 +58,7 @@ LITTLE_MORE = 0.01
 within a family it is `MATERIAL`."""
 CHANCE = 0.05
 """p-value of the best effect from which coloured noise explains the error as well."""
-SLIGHT = 0.01
+SLIGHT = 0.002
 """Share of the error's energy above the floor that a finer law of the same physics must explain
 beyond a simpler one to be named in place of it."""
 MOST_OF_IT = 0.75
@@ -353,6 +353,11 @@ def _as_good(base: Fitted, top: Ranked, row: Ranked, floor: NoiseFloor) -> bool:
 
 
 def _gains_little(base: Fitted, top: Ranked, row: Ranked, floor: NoiseFloor) -> bool:
-    """Whether the best explains hardly more of the error above the floor than another row."""
-    left = [floor.left_over(base.held_out, r.fitted.held_out) for r in (top, row) if r.fitted]
-    return left[-1] - left[0] < SLIGHT
+    """Whether the best explains hardly more of the error above the floor than another row.
+
+    Of the training or of what is held out: what a law has and another lacks shows in both.
+    """
+    fits = [r.fitted for r in (top, row) if r.fitted]
+    held_out = [floor.left_over(base.held_out, each.held_out) for each in fits]
+    train = [floor.of_training.left_over(base.train, each.train) for each in fits]
+    return min(held_out[-1] - held_out[0], train[-1] - train[0]) < SLIGHT
