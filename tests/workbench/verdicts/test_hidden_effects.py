@@ -93,6 +93,7 @@ def test_what_no_known_effect_explains_is_reported_as_unknown(known: tuple[str, 
     assert verdict.word == "unknown_effect"
 
 
+@pytest.mark.nightly
 @IN_ANY_LIBRARY
 def test_two_hidden_effects_are_named_in_two_steps(known: tuple[str, ...]) -> None:
     data = simulated(("coulomb", "cubic_stiffness"), 0.05)
