@@ -86,13 +86,12 @@ def two_effects(
         tolerant: whether a pair along the measured motion may leave more than the noise floor.
     """
     fits = _fitted(bench, likely_pairs(bench, rows), progress)
-    alone = _single(bench, verdict, fits)
-    if alone.alone:
-        return alone
     good = _explaining(bench, fits, tolerant=tolerant)
     if fits and not good:
         rows, fits = _refined(bench, rows, fits, progress)
         good = _explaining(bench, fits, tolerant=tolerant)
+    if _is_alone(bench, verdict, fits):
+        return dataclasses.replace(verdict, alone=True)
     # Of a pair with a finer law than is named beside the other effect, the plain one is in another.
     for best, together in sorted(good, key=lambda found: found[1].held_out_error):
         first = _verdict_with(bench, rows, fits, best.other, best.one)
@@ -100,14 +99,14 @@ def two_effects(
         if first is not None and second is not None:
             found = _both_named(bench, first, second, together)
             return dataclasses.replace(found, best=_row(rows, found.best))
-    return _single(bench, verdict, fits)
+    return verdict
 
 
-def _single(bench: Bench, verdict: Verdict, fits: Sequence[tuple[Pair, Fitted]]) -> Verdict:
-    """The verdict on single effects, that no pair replaces."""
-    beside = [] if bench.study.model.rough else [fitted for _, fitted in fits]
-    alone = acts_alone(bench.base, bench.floor, verdict, beside)
-    return dataclasses.replace(verdict, alone=True) if alone else verdict
+def _is_alone(bench: Bench, verdict: Verdict, fits: Sequence[tuple[Pair, Fitted]]) -> bool:
+    """Whether no pair leaves much less than the single effect named."""
+    if bench.study.model.rough:
+        return False
+    return acts_alone(bench.base, bench.floor, verdict, [fitted for _, fitted in fits])
 
 
 def likely_pairs(bench: Bench, rows: Sequence[Ranked]) -> list[Pair]:
