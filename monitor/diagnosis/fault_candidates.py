@@ -134,14 +134,12 @@ def _not_too_short(effect: Effect) -> Effect:
     """The effect; of a law of dry friction with no shorter way to slip than a change tells."""
     if effect.family != DRY_FRICTION:
         return effect
-    bounded = {
-        name: structs.replace(p, low=max(p.low, SHORTEST))
-        if p.scale == "x"
-        else structs.replace(p, high=min(p.high, 1 / SHORTEST))
-        if p.scale == "1/x"
-        else p
-        for name, p in effect.parameters.items()
-    }
+    bounded = dict(effect.parameters)
+    for name, p in bounded.items():
+        if p.scale == "x":
+            bounded[name] = structs.replace(p, low=max(p.low, SHORTEST))
+        elif p.scale == "1/x":
+            bounded[name] = structs.replace(p, high=min(p.high, 1 / SHORTEST))
     return structs.replace(effect, parameters=bounded)
 
 

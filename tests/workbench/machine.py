@@ -13,6 +13,14 @@ from rigwatch.workbench.study.study import Study, open_study
 Table = Mapping[str, np.ndarray]
 
 
+def tones(
+    draw: np.random.Generator, t: np.ndarray, low: float, high: float, count: int
+) -> np.ndarray:
+    """A sum of tones of size 1 at the times `t` [s], drawn between two frequencies [Hz]."""
+    frequencies, phases = draw.uniform(low, high, count), draw.uniform(0, 6, count)
+    return np.asarray(np.sin(2 * np.pi * t[:, None] * frequencies + phases).sum(axis=1))
+
+
 def recorded(path: Path, table: Table, units: Mapping[str, str], rate: float = 100.0) -> None:
     """A session at `path`, by way of a CSV file."""
     lines = [",".join(table)]

@@ -35,7 +35,7 @@ from rigwatch.workbench.study import Study
 AGAIN = 0.25
 """Share of the energy above the floor that an effect must explain, to first order, to be fitted
 again if its fit may have ended in a local minimum."""
-MOST_OF_IT = 0.75
+SEEMS = 0.75
 """Share of the residual, to first order, from which a refused effect is not what it seems."""
 MUCH_WORSE = 1.5
 """Ratio of held-out errors too large to be caused by other missing physics favouring one effect.
@@ -286,7 +286,7 @@ def _substitutes_of_refused(base: Fitted, rows: Sequence[Ranked]) -> list[Ranked
     nothing of it when fitted is not what it looks like: a finite strength does something else.
     """
     fitted = [row for row in rows if row.fitted is not None and not row.accepted]
-    refused = {row.label for row in fitted if base.train.continued or row.explained > MOST_OF_IT}
+    refused = {row.label for row in fitted if base.train.continued or row.explained > SEEMS}
     waiting = [row for row in rows if row.fitted is None and not row.failure]
     return [r for r in waiting if r.fitted_instead in refused and _may_be_it(r)]
 

@@ -7,7 +7,7 @@ import pytest
 
 from rigwatch.workbench.explain.explain import explain
 from rigwatch.workbench.study.study import Study
-from tests.workbench.machine import Table, studied, with_healthy
+from tests.workbench.machine import Table, studied, tones, with_healthy
 from tests.workbench.simulated import knowing
 
 CARRIAGE = """
@@ -39,8 +39,7 @@ def moved(seed: int, cubic: float, seconds: float = 60.0) -> Table:
     """Position under a force of many tones, with a spring that hardens [N/m^3]."""
     draw = np.random.default_rng(seed)
     t = np.arange(0, seconds, 1 / RATE)
-    tones, phases = draw.uniform(0.1, 5.0, 12), draw.uniform(0, 6, 12)
-    force = 1.2 * np.sin(2 * np.pi * t[:, None] * tones + phases).sum(axis=1)
+    force = 1.2 * tones(draw, t, 0.1, 5.0, 12)
     x, v, found, step = 0.0, 0.0, np.empty(len(t)), 1 / RATE / SUBSTEPS
     for n in range(len(t)):
         found[n] = x

@@ -180,8 +180,10 @@ def _returns(system: System, memory: Sequence[str]) -> Sequence[sympy.Expr]:
 
 
 def _unlimited(system: System, names: Sequence[str]) -> Sequence[sympy.Expr]:
-    """The same where no limit of the rate is reached: what is limited at both ends of an interval
-    may arrive within it."""
+    """The same with the rate's limits lifted, where it has any.
+
+    A state that is limited at both ends of an interval may arrive within it.
+    """
     slopes = [derivative(system.derivatives[name], symbol(name)) for name in names]
     limited = [s for s in slopes if s.has(sympy.Heaviside)]
     lifted = (s.replace(sympy.Heaviside, lambda *_: sympy.Integer(1)) for s in limited)
