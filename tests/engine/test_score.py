@@ -102,6 +102,36 @@ def test_a_direction_does_not_grow_where_a_decay_is_faster_than_the_steps(name):
     assert wrong <= 2e-2 * np.sqrt(np.mean(expected[..., moved] ** 2))
 
 
+@pytest.mark.parametrize("name", ["coulomb", "jenkins", "gain"])
+def test_a_contact_that_is_faster_than_samples_asks_for_no_nodes_between_them(name):
+    model = shipped_models()["emps-force"]
+    effect, contact = ready(name), ready("dahl")
+    port = "force_sensor" if name == "gain" else "load"
+    time = np.arange(400) * DT
+    given = np.stack(
+        [np.sin(7.0 * time), 7.0 * np.cos(7.0 * time), -49.0 * np.sin(7.0 * time)], axis=1
+    )
+    there = Placement("dahl", contact, "load")
+    whole = compile_system(compose(model, [there, Placement(name, effect, port)]))
+    bare = compile_system(compose(model, [there]))
+    known = {"load_dahl_Fc": 2.0, "load_dahl_s": 3000.0}
+    strength = f"{port}_{name}_{effect.strength}"
+    starts, neutral = np.array([0]), effect.parameters[effect.strength].neutral
+    run = whole.simulate(
+        given, DT, starts, len(given), initial=np.zeros((1, len(whole.system.states))),
+        parameters=whole.vector({**known, strength: neutral}),
+    )  # fmt: skip
+    expected = run.slopes[..., whole.system.free.index(strength)]
+    at = trajectory(
+        bare, given, DT, starts, len(given), initial=np.zeros((1, len(bare.system.states))),
+        parameters=bare.vector(known), substeps=32,
+    )  # fmt: skip
+    assert at.time.shape == (1, len(given))
+    shape = {n: p.value for n, p in effect.parameters.items() if n != effect.strength}
+    found = directions(at, [Candidate(name, effect, port, shape)])[..., 0]
+    assert root_mean_square(found - expected) <= 2e-2 * root_mean_square(expected)
+
+
 @pytest.mark.parametrize("name", ["coulomb_running_in", "jenkins"])
 def test_what_an_effect_remembers_is_of_its_own_recording(name):
     effect, u = ready(name), excitation()[:768]

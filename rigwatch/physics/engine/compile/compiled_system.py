@@ -1,7 +1,7 @@
 """A system that can be simulated, with exact sensitivities, and linearised along a trajectory."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -65,6 +65,15 @@ class Linearisation:
     outputs: FloatArray
     update_slopes: FloatArray
     time: FloatArray
+
+    def at_samples(self) -> "Linearisation":
+        """The nodes at the samples alone, for what nothing fast passes on to the outputs."""
+        every = slice(None, None, self.substeps)
+        return replace(
+            self, substeps=1, spacing=self.spacing[:, every] * self.substeps,
+            states=self.states[:, every], rate_slopes=self.rate_slopes[:, every],
+            time=self.time[:, every],
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

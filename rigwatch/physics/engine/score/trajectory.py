@@ -59,11 +59,17 @@ def trajectory(
     begins: IntArray | None = None,
     time: FloatArray | None = None,
 ) -> Trajectory:
-    """The run of `CompiledSystem.linearise`, same arguments, with inputs and time at its nodes."""
+    """The run of `CompiledSystem.linearise`, same arguments, with inputs and time at its nodes.
+
+    Of a model without states of its own, such as a force along a measured motion, the nodes are
+    the samples: the fast states of a contact pass on to its outputs what they are, and nothing else.
+    """
     run = compiled.linearise(
         inputs, dt, starts, length, initial=initial, parameters=parameters, substeps=substeps,
         begins=begins, time=time,
     )  # fmt: skip
+    if not compiled.system.model.states:
+        run, substeps = run.at_samples(), 1
     nodes = np.arange(run.states.shape[1])
     row, place = nodes // substeps, (nodes % substeps) / substeps
     rows = starts[:, None] + row
