@@ -7,6 +7,7 @@ import hashlib
 import shlex
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -78,10 +79,12 @@ def _run(arguments: list[str | Path], say: Callable[[str], None]) -> None:
     words = [relative(word) if isinstance(word, Path) else word for word in arguments]
     say(f"    $ rigwatch {shlex.join(words)}")
     command = [sys.executable, "-m", "rigwatch", *words]
+    begun = time.monotonic()
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         reason = (done.stderr or done.stdout).strip().splitlines() or ["no reason given"]
         raise ModelError(f"rigwatch {words[0]} failed: {reason[-1]}")
+    say(f"      done after {time.monotonic() - begun:.0f} s")
 
 
 def _made_from(config: Path) -> str:

@@ -182,6 +182,7 @@ def test_jittered_samples_are_resampled_and_said_so(tmp_path: Path) -> None:
     assert (quality.valid(column.quality) == ~in_hole).all()
     notes = open_session(result.path).info.notes
     assert "600 samples resampled to" in notes
+    assert "at 100 Hz by linear interpolation" in notes
     assert f"{in_hole.sum()} samples in holes are flagged stale" in notes
 
 

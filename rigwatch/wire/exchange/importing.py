@@ -101,9 +101,10 @@ def _time_base(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[s
     span = f"{shortest * 1e3:.3g} to {longest * 1e3:.3g} ms"
     if shortest >= 1:
         span = f"{shortest:.3g} to {longest:.3g} s"
+    held = f", {' and '.join(mapping.held)} by means over each step" if mapping.held else ""
     remark = (
-        f"time stamps in steps of {span}: "
-        f"{len(times)} samples resampled to {len(grid.times)} at {grid.rate_hz:g} Hz"
+        f"time stamps in steps of {span}: {len(times)} samples resampled to {len(grid.times)}"
+        f" at {grid.rate_hz:g} Hz by linear interpolation{held}"
     )
     return _TimeBase(grid, stamps), (
         *stamps.remarks,

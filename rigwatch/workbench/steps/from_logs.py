@@ -128,14 +128,14 @@ def _derive_section(
 
 
 def _not_fitted(logs: Logs, model: Model) -> list[str]:
-    """A remark on the fixed parameters that keep the model file's values, if there are any."""
+    """A remark on fixed parameters that keep their values of the model's file, if there are any."""
     given = {*logs.start, *(name for values in logs.known.values() for name in values)}
     fixed = [n for n, p in model.parameters.items() if p.fixed and n not in given]
     if not fixed:
         return []
     differ = f", or --set LOG:{fixed[0]}=VALUE where logs differ" if len(logs.data) > 1 else ""
     return [
-        f"{', '.join(fixed)}: not fitted, taken from the model file; set known values with"
+        f"{', '.join(fixed)}: not fitted, as the model's file says; give this machine's values with"
         f" --set {fixed[0]}=VALUE{differ}"
     ]
 

@@ -156,7 +156,7 @@ def _derived(
         ModelError: a signal is the rate of no channel, or may be that of several.
     """
     signals: dict[str, Input | Output] = {**model.inputs, **model.outputs}
-    rates, unknown = dict[str, tuple[str, int]](), list[tuple[str, str]]()
+    rates, unknown = dict[str, tuple[str, int]](), list[tuple[str, str, tuple[str, ...]]]()
     for name in missing:
         # What drives a machine, as a set value, does not tell how the machine has moved.
         sides = (model.inputs, model.outputs) if name in model.inputs else (model.outputs,)
@@ -169,8 +169,8 @@ def _derived(
             continue
         (rates[channel],) = made
     if unknown:
-        named = " and ".join(told for told, _ in unknown)
-        options = " ".join(option for _, option in unknown)
+        named = " and ".join(told for told, *_ in unknown)
+        options = _options([(option, fit) for _, option, fit in unknown])
         raise ModelError(
             f"found no unique column for {named} among {', '.join(columns)}; expected {options}"
         )
@@ -403,8 +403,8 @@ def _unknown(
     signal: Input | Output,
     free: Sequence[Header],
     sources: Sequence[str] = (),
-) -> tuple[str, str]:
-    """A signal that no column is known to be, and the option that names one.
+) -> tuple[str, str, tuple[str, ...]]:
+    """A signal that no column is known to be, the option that names one, and columns for it.
 
     Args:
         name, channel, signal: the signal.
@@ -412,6 +412,20 @@ def _unknown(
         sources: channels of which it may be the rate, if there are several.
     """
     unit = signal.shown or signal.unit
-    options = [f"--map '{channel}={each.column}'" for each in free if _fits(each, signal)]
+    fit = tuple(each.column for each in free if _fits(each, signal))
     rate = f", which may be the rate of {' or '.join(sources)}" if sources else ""
-    return f"{name} [{unit}]{rate}", " or ".join(options) or f"--map {channel}=COLUMN[{unit}]"
+    option = f"--map '{channel}=COLUMN'" if fit else f"--map '{channel}=COLUMN[{unit}]'"
+    return f"{name} [{unit}]{rate}", option, fit
+
+
+def _options(unknown: Sequence[tuple[str, tuple[str, ...]]]) -> str:
+    """Options that name columns, each list of columns once: signals of one unit share theirs."""
+    told = list[str]()
+    for fit in dict.fromkeys(fit for _, fit in unknown):
+        options = " ".join(option for option, own in unknown if own == fit)
+        if len(fit) == 1:
+            told.append(options.replace("COLUMN", fit[0]))
+        else:
+            columns = f", COLUMN being {' or '.join(map(repr, fit))}" if fit else ""
+            told.append(options + columns)
+    return "; ".join(told)

@@ -110,3 +110,13 @@ def test_a_letter_is_no_part_of_a_word() -> None:
         matched(["time", "current", "angle", "speed"], servo("u"), {})
     found = matched(["time", "u 1", "angle", "speed"], servo("u"), {})
     assert found.channels["u"] == "u 1[rad]"
+
+
+def test_columns_that_suit_several_signals_are_told_once() -> None:
+    with pytest.raises(ModelError) as told:
+        matched(["time [s]", "torque [N m]", "a1 [rad]", "b1 [rad]"], two_shafts("speed"), {})
+    options = str(told.value).partition("expected ")[2]
+    assert options == (
+        "--map 'motor_angle=COLUMN' --map 'load_angle=COLUMN', COLUMN being 'a1 [rad]' or"
+        " 'b1 [rad]'; --map 'speed=COLUMN[rad/s]'"
+    )

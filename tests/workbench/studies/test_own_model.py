@@ -103,7 +103,7 @@ def test_with_a_port_that_no_effect_suits_the_error_is_unknown(tmp_path: Path) -
         (
             "a = { value = 1.0",
             "a = { low = 3.0, value = 1.0",
-            "parameters.a: found value = 1, expected at least 3 1/s",
+            "parameters.a: found value = 1 1/s, expected at least 3 1/s",
         ),
         (
             "a = { value = 1.0",

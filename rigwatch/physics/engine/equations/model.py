@@ -110,16 +110,19 @@ class Parameter(Section, frozen=True, kw_only=True):
 
         A value that rounding has moved from a bound keeps it.
         """
-        name = self.shown or self.unit
-        unit = unit_of(name)
-        value = float(unit.to_si(written))
+        value = float(unit_of(self.shown or self.unit).to_si(written))
         if not math.isfinite(value):
             return "a finite number"
         kept = self.low <= value <= self.high
         if kept or math.isclose(value, self.low) or math.isclose(value, self.high):
             return ""
         bound, most = (self.low, "at least") if value < self.low else (self.high, "at most")
-        return f"{most} {unit.from_si(bound):g} {'' if name == '1' else name}".rstrip()
+        return f"{most} {self.told(bound)}"
+
+    def told(self, value: float) -> str:
+        """A value with the unit it is shown in."""
+        name = self.shown or self.unit
+        return f"{unit_of(name).from_si(value):g} {'' if name == '1' else name}".rstrip()
 
     def __post_init__(self) -> None:
         if math.isnan(self.value):

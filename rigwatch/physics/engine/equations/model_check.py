@@ -108,7 +108,9 @@ def _check_bounds(model: Model) -> None:
                 " high"
             )
         if broken := own.bounds_broken(value):
-            raise ModelError(f"parameters.{name}: found value = {value:g}, expected {broken}")
+            raise ModelError(
+                f"parameters.{name}: found value = {own.told(own.value)}, expected {broken}"
+            )
 
 
 def _check_channels(model: Model) -> None:
