@@ -62,7 +62,7 @@ def trajectory(
     """The run of `CompiledSystem.linearise`, same arguments, with inputs and time at its nodes.
 
     Of a model without states of its own, such as a force along a measured motion, the nodes are
-    the samples: the fast states of a contact pass on to its outputs what they are, and nothing else.
+    the samples: the fast states of a contact pass nothing on from one to the next.
     """
     run = compiled.linearise(
         inputs, dt, starts, length, initial=initial, parameters=parameters, substeps=substeps,
