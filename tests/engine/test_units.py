@@ -173,6 +173,7 @@ def test_a_temperature_alone_has_an_offset() -> None:
         ("Mpa", "did you mean 'MPa'?"),
         ("sec", "did you mean 's'?"),
         ("furlong", "'furlong', expected a known one: m, mm, kg"),
+        ("cmH2O", "in 'cmH2O', expected a known one: did you mean 'cmWC'?"),
         ("N/(m", "expected as many '(' as ')'"),
         ("N)", "expected as many '(' as ')'"),
         ("N ? m", "cannot be read from '? m' on"),

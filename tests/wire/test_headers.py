@@ -39,6 +39,8 @@ from rigwatch.wire.units import unit_of
         ("torque [N-m]", "torque", "N m"),
         ("drag [N/(m/s)]", "drag", "N/(m/s)"),
         ("pressure [mBar]", "pressure", "mbar"),
+        ("airway [cmH2O]", "airway", "cmWC"),
+        ("static (in.WG)", "static", "inWC"),
         ("share [-]", "share", "1"),
     ],
 )

@@ -238,7 +238,9 @@ def _raised(factor: Fraction, power: Fraction) -> Fraction:
 
 def _unknown(name: str, text: str) -> UnitError:
     within = "" if name == text else f" in {text!r}"
-    return UnitError(f"the unknown unit {name!r}{within}", f"a known one: {_meant(name)}")
+    # A name with a figure in it, such as cmH2O, is no power.
+    meant = _meant(text if text.lower() in IN_OTHER_WORDS else name)
+    return UnitError(f"the unknown unit {name!r}{within}", f"a known one: {meant}")
 
 
 def _meant(name: str) -> str:

@@ -34,6 +34,9 @@ INCH = Fraction("0.0254")
 POUND = Fraction("0.45359237")
 GRAVITY = Fraction("9.80665")
 POUND_FORCE = POUND * GRAVITY
+ATMOSPHERE = 101325
+MERCURY = Fraction("133.322387415")
+"""A millimetre of mercury, by convention at 13 595.1 kg/m³ [Pa]."""
 RANKINE = Fraction(5, 9)
 
 
@@ -93,8 +96,10 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity("torque", "N m", {"kg": 1, "m": 2, "s": -2}, {"Nm": 1}, ("Nm",)),
     Quantity(
         "pressure", "Pa", {"kg": 1, "m": -1, "s": -2},
-        {"Pa": 1, "bar": 10**5, "atm": 101325, "psi": POUND_FORCE / INCH**2,
-         "ksi": 1000 * POUND_FORCE / INCH**2}, ("Pa", "bar"),
+        {"Pa": 1, "bar": 10**5, "atm": ATMOSPHERE, "psi": POUND_FORCE / INCH**2,
+         "ksi": 1000 * POUND_FORCE / INCH**2, "Torr": Fraction(ATMOSPHERE, 760), "mmHg": MERCURY,
+         "inHg": 1000 * INCH * MERCURY, "mmWC": GRAVITY, "cmWC": 10 * GRAVITY,
+         "inWC": 1000 * INCH * GRAVITY}, ("Pa", "bar"),
     ),
     Quantity(
         "energy", "J", {"kg": 1, "m": 2, "s": -2}, {"J": 1, "Wh": 3600, "kWh": 3600000}, ("J",)
@@ -133,6 +138,7 @@ IN_OTHER_WORDS = {
     "degree": "deg", "degrees": "deg", "radian": "rad", "kelvin": "K", "celsius": "degC",
     "fahrenheit": "degF", "rps": "rev/s", "lpm": "l/min", "kph": "km/h", "sek": "s", "meters": "m",
     "metres": "m", "newtons": "N", "amps": "A", "amperes": "A", "watts": "W", "radians": "rad",
+    "mmh2o": "mmWC", "cmh2o": "cmWC", "inh2o": "inWC", "inwg": "inWC", "in.wg": "inWC",
 }  # fmt: skip
 """Other names of units, for which errors suggest the right one."""
 

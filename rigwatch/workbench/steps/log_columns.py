@@ -214,7 +214,7 @@ def _is_time(header: Header) -> bool:
 
 def _time_unit(time: Header) -> str:
     if time.unknown:
-        raise ModelError(_no_unit(time, f"--time '{time.column}[s]'"))
+        raise ModelError(_no_unit(time, f"--time '{time.column}[s]' with the column's unit"))
     return time.units[0] if time.units else "s"
 
 
@@ -312,7 +312,9 @@ def _unit(header: Header, channel: str, signal: Input | Output) -> tuple[str, li
     readings = ((as_meant(each, wanted), each) for each in header.units)
     unit, written = next((reading for reading in readings if reading[0]), ("", ""))
     if not unit and header.unknown and wanted not in ("", "1"):
-        raise ModelError(_no_unit(header, f"--map '{channel}={header.column}[{wanted}]'"))
+        option = f"--map '{channel}={header.column}"
+        known, scaled = f"{option}[UNIT]' with a known one", f"{option} * FACTOR [{wanted}]'"
+        raise ModelError(_no_unit(header, f"{known} or {scaled}"))
     if not unit and header.units:
         raise ModelError(
             f"{header.column}: found the unit {header.units[0]} in the header for {channel}"
@@ -371,7 +373,7 @@ def _header_typed(text: str, headers: Sequence[Header]) -> Header | None:
 def _no_unit(header: Header, option: str) -> str:
     return (
         f"{header.column}: found {header.unknown!r} in the header's brackets, which is no unit that"
-        f" is known; expected {option} with the column's unit"
+        f" is known; expected {option}"
     )
 
 
@@ -419,13 +421,13 @@ def _unknown(
 
 
 def _options(unknown: Sequence[tuple[str, tuple[str, ...]]]) -> str:
-    """Options that name columns, each list of columns once: signals of one unit share theirs."""
+    """Options that name columns; columns that suit several signals are told once."""
     told = list[str]()
     for fit in dict.fromkeys(fit for _, fit in unknown):
-        options = " ".join(option for option, own in unknown if own == fit)
-        if len(fit) == 1:
-            told.append(options.replace("COLUMN", fit[0]))
+        options = [option for option, own in unknown if own == fit]
+        if fit and len(options) == 1:
+            told.append(" or ".join(options[0].replace("COLUMN", column) for column in fit))
         else:
             columns = f", COLUMN being {' or '.join(map(repr, fit))}" if fit else ""
-            told.append(options + columns)
+            told.append(" ".join(options) + columns)
     return "; ".join(told)

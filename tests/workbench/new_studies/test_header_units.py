@@ -75,9 +75,14 @@ def test_a_unit_that_is_not_known_is_asked_for(tmp_path, run, capsys):
     assert made(tmp_path, run, "Speed [turns/min]") == 2
     said = capsys.readouterr().err
     assert "Speed [turns/min]: found 'turns/min' in the header's brackets" in said
-    assert "--map 'speed=Speed [turns/min][rad/s]'" in said
-    assert made(tmp_path, run, "Speed [turns/min]", "--map", "speed=Speed [turns/min][rpm]") == 0
-    np.testing.assert_allclose(speed(tmp_path), run["speed_rad_s"][:100], rtol=1e-9, atol=1e-9)
+    assert "--map 'speed=Speed [turns/min][UNIT]' with a known one" in said
+    assert "or --map 'speed=Speed [turns/min] * FACTOR [rad/s]'" in said
+    for number, given in enumerate(("[rpm]", " * 0.10471975512 [rad/s]")):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        option = f"speed=Speed [turns/min]{given}"
+        assert made(folder, run, "Speed [turns/min]", "--map", option) == 0
+        np.testing.assert_allclose(speed(folder), run["speed_rad_s"][:100], rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -195,12 +200,12 @@ def test_all_signals_without_a_column_are_told_at_once():
         matched(["time [s]", "Power [W]", "one [bar]", "other [bar]"], BLOCK, {})
 
     assert "for ambient [K] and temperature [K] among" in str(error.value)
-    assert str(error.value).endswith("--map ambient=COLUMN[K] --map temperature=COLUMN[K]")
+    assert str(error.value).endswith("--map 'ambient=COLUMN[K]' --map 'temperature=COLUMN[K]'")
 
 
 def test_a_column_of_another_signal_is_not_offered():
     columns = ["Time (s)", "force_N", "drive_point [m/s^2]", "tip [mm]"]
-    with pytest.raises(ModelError, match=r"--map tip_point=COLUMN\[m/s\^2\]$"):
+    with pytest.raises(ModelError, match=r"--map 'tip_point=COLUMN\[m/s\^2\]'$"):
         matched(columns, BEAM, {})
 
 
