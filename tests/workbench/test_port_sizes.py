@@ -76,3 +76,30 @@ def test_a_measured_difference_has_its_size_and_what_nobody_measures_that_of_a_r
     # A push of 1 N moves what stands on a spring of 50 N/m by some centimetres, and not by a metre.
     assert 1e-3 < sizes["ground"]["x"] < 0.1
     assert sizes["ground"]["v"] < 1.0
+
+
+SERVO = """
+name = "servo"
+summary = "a surface that a servo turns, of which its motion alone is measured"
+inputs.command = { unit = "rad" }
+quantities.deflection = { expression = "d", unit = "rad" }
+states.d = { unit = "rad", derivative = "(command - d)/tau" }
+states.q = { unit = "rad/s", derivative = "gain*surface - q/tau", measured = "rate" }
+parameters.tau = { value = 0.05, unit = "s" }
+parameters.gain = { value = 1.0, unit = "1/s^2" }
+outputs.rate = { unit = "rad/s", expression = "q" }
+[ports.surface]
+kind = "actuator"
+signal = "deflection"
+"""
+
+
+def test_a_signal_that_nobody_measures_has_the_size_that_it_has_in_a_run() -> None:
+    model = parse(SERVO, Model, "servo")
+    turned = 2 * np.pi * 1.5
+    command = 0.06 * np.sin(turned * TIME)
+    recording = Recording(1 / RATE, command[:, None], np.zeros((len(TIME), 1)))
+    size = 0.06 / np.sqrt(2) / np.hypot(1.0, 0.05 * turned)
+    found = port_sizes(model, recording)["surface"]
+    assert found["u"] == pytest.approx(size, rel=0.02)
+    assert found["rate"] == pytest.approx(turned * size, rel=0.02)
