@@ -15,6 +15,9 @@ from rigwatch.workbench.ranking import MATERIAL, STEP, Ranked, difference, refit
 AS_BEFORE = 1.05
 """Largest ratio of the healthy recording's error to that of the parameters' own fit to it: the
 allowance of the noise floor along a healthy motion."""
+NEARLY_AS_BEFORE, EXPLAINED = 1.1, 0.03
+"""That ratio where the effect explains the error: it leaves at most this share of its energy beyond
+the model's own. A model that is a little wrong fits each motion alone a little better than both."""
 REFUSED = "the healthy recording is no longer described with it"
 
 
@@ -51,7 +54,9 @@ def spoils_healthy(bench: Bench, fitted: Fitted) -> bool:
         return False
     assert bench.bare is not None
     first = len(with_effects(bench.study.model, bench.data.train))
-    return _size(fitted.train, first) > AS_BEFORE * _size(bench.bare.train, 0)
+    ratio = _size(fitted.train, first) / _size(bench.bare.train, 0)
+    left = bench.floor.beyond_own_error(bench.base.held_out, fitted.held_out, fitted.calm)
+    return ratio > (NEARLY_AS_BEFORE if left <= EXPLAINED else AS_BEFORE)
 
 
 def fitted_beside_healthy(bench: Bench, row: Ranked) -> tuple[Bench, Ranked] | None:

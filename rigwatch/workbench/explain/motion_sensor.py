@@ -20,7 +20,7 @@ from rigwatch.physics.engine.equations import Placement
 from rigwatch.physics.engine.fit import Recording, evaluate, with_effects
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.compare import Bench
+from rigwatch.workbench.compare import Bench, refuse_what_spoils
 from rigwatch.workbench.data import Data, MotionSensor
 from rigwatch.workbench.explain.indistinguishable import EQUAL, NEARLY, lead
 from rigwatch.workbench.explain.verdict import Verdict, Word
@@ -75,6 +75,7 @@ def motion_sensor_rows(bench: Bench) -> list[Ranked]:
             row = _row(Placement(name, effect, sensor.port), explained, strength)
             row.fitted = fitted
             judge_fit(bench.base, row)
+            refuse_what_spoils(bench, [row])
             _deny_gain(bench, sensor, row)
             found.append(row)
     return found

@@ -19,6 +19,10 @@ two that are left explains that much."""
 LITTLE_IN_TRAINING = LITTLE / 2
 """The same of the training, which excites a missing effect about as much as what is held out."""
 AGAIN = "explain again once it is added"
+GOES_ELSEWHERE = (
+    "what is held out shows more than the training does: exchange [[train]] and [[held_out]] in the"
+    " study's file, or give each a part of every recording"
+)
 MENTIONED = 3
 """Number of further accepted effects that are listed."""
 
@@ -87,9 +91,20 @@ def remaining_error(base: Fitted, row: Ranked, floor: NoiseFloor) -> str:
     if share > 1.0:
         return f"; it raises the {of} to {times:.2g} times the noise floor"
     if share:
-        return f"; {share:.0%} of the {of}'s energy remains, {times:.2g} times the noise floor"
+        told = f"; {share:.0%} of the {of}'s energy remains, {times:.2g} times the noise floor"
+        only = _only_held_out_lacks(base, row, floor)
+        return told + (f", but next to nothing of the training's; {GOES_ELSEWHERE}" if only else "")
     above = floor.own_error is None and floor.ratio(fitted) > NEAR
     return f"; what is left is {times:.2g} times the noise floor: {AGAIN}" if above else ""
+
+
+def _only_held_out_lacks(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
+    """Whether an effect explains the error of the training, and little of that held out."""
+    trained = floor.of_training
+    if trained.method == "healthy motion" or trained.reached(base.train):
+        return False
+    explained = _remaining_in_training(base, row, floor) == 0.0
+    return explained and _remaining_held_out(base, row, floor) > LITTLE
 
 
 def _remaining_held_out(base: Fitted, row: Ranked, floor: NoiseFloor) -> float:

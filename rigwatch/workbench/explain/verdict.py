@@ -33,6 +33,7 @@ from rigwatch.workbench.explain.indistinguishable import (
     undistinguished,
 )
 from rigwatch.workbench.explain.remaining_error import (
+    GOES_ELSEWHERE,
     explains,
     explains_little,
     hardly_trains,
@@ -253,6 +254,8 @@ def _nothing_found(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> V
     if fitted:
         nearest = min(fitted, key=lambda row: row.held_out_error)
         text += f"; nearest is {nearest.label}, refused: {nearest.reason}"
+    if floor.of_training.reached(base.train):
+        noise = f"; the training is described down to its noise, and {GOES_ELSEWHERE}"
     return Verdict("unknown_effect", None, (), (), text + _untried(rows) + noise)
 
 

@@ -20,6 +20,7 @@ from rigwatch.workbench.explain.sets.combination import Combination
 from rigwatch.workbench.explain.sets.several_effects import (
     _Member,
     _named_alone,
+    _set_verdict,
     _with_alternatives,
     may_need_several,
     with_similar,
@@ -282,6 +283,18 @@ def test_of_training_and_held_out_error_the_one_that_keeps_more_is_told() -> Non
     assert remaining_share(base(), named, QUIET) == pytest.approx(0.375)
     said = judge(base(), [named], QUIET).text
     assert "; 38% of the training error's energy remains, 2 times the noise floor" in said
+
+
+@pytest.mark.parametrize(("train", "told"), [(1.0, True), (2.9, False)])
+def test_what_only_the_held_out_shows_is_told(train: float, *, told: bool) -> None:
+    named = best(error=2.8)
+    assert named.fitted is not None
+    named.fitted = replace(named.fitted, train=base(train).train)
+    said = judge(base(), [named], PERIODS).text
+    assert ("exchange [[train]] and [[held_out]]" in said) == told
+    nothing = replace(base(), train=base(train).train)
+    said = judge(nothing, [row("a@x", accepted=False)], PERIODS).text
+    assert ("the training is described down to its noise" in said) == told
 
 
 @pytest.mark.parametrize(
@@ -902,6 +915,26 @@ def test_an_effect_that_equally_good_sets_replace_is_not_said_to_be_missing(inst
     else:
         assert (found.word, found.rivals) == ("undetermined", (instead,))
         assert found.text == "convection@x and radiation@x explain it equally well"
+
+
+@pytest.mark.parametrize(
+    ("third", "word"),
+    [
+        pytest.param("viscous@pitching", "undetermined", id="at one port"),
+        pytest.param("delay@command", "missing_effect", id="at two"),
+    ],
+)
+def test_three_laws_at_one_port_stand_for_any_other(third: str, word: str) -> None:
+    """As stiffnesses beyond places of their own do for a stall with hysteresis."""
+    each = (best("cubic_stiffness@pitching"), row("hard_stop@pitching"), row(third))
+    bench: Any = SimpleNamespace(base=base(), floor=PERIODS, data=SimpleNamespace(of_healthy=None))
+    parts = [
+        _Member(one, Verdict("missing_effect", one, (one.label,), (), f"{one.label} is missing"))
+        for one in each
+    ]
+    found = _set_verdict(bench, each, parts[0].verdict, Combination(each), parts)
+    assert found.word == word
+    assert ("may be missing there" in found.text) == (word == "undetermined")
 
 
 def test_of_a_class_the_effect_that_the_sentence_names_is_the_one_to_add() -> None:

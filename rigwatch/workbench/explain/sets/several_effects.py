@@ -49,6 +49,8 @@ from rigwatch.workbench.ranking import (
 )
 
 UNNAMED = ("undetermined", "unknown_effect")
+MANY = 3
+"""Laws at one port that together follow nearly any law."""
 ROUNDS = 4
 """Largest number of times that an effect of the set is left out, or replaced by a better one."""
 
@@ -306,6 +308,8 @@ def _set_verdict(
     row = _named_alone(first, alone)
     if row.fitted is None:
         refit(bench.study, bench.data, bench.base, row)
+    if _follows_any_law(best):
+        return _undetermined_among(verdict, row, best)
     if not row.accepted and first.certain:
         first = replace(first, verdict=with_similar(first.verdict, first.ranked))
     found, second = first.verdict, then[0].verdict.members if first.certain and then else ()
@@ -318,6 +322,25 @@ def _set_verdict(
         evidence=Evidence(left, found.evidence.margin),
         beside=others,
     )
+
+
+def _follows_any_law(best: Combination) -> bool:
+    """Whether a set is of so many laws at one port that a law which is none of them passes for it.
+
+    As three stiffnesses with places of their own do for a stall with hysteresis.
+    """
+    return len(best.rows) >= MANY and len({row.port for row in best.rows}) == 1
+
+
+def _undetermined_among(verdict: Verdict, row: Ranked, best: Combination) -> Verdict:
+    """The verdict where a set of laws at one port leaves only noise; `row` is of one of them."""
+    text = (
+        f"{_joined(best.labels)} together leave {best.fitted.told_error:.3g}"
+        f" {best.fitted.told_in}, but so many laws at one port follow nearly any other:"
+        " one that is not in the library may be missing there"
+    )
+    rivals = tuple(sorted({*verdict.rivals, *best.labels} - {row.label}))
+    return replace(verdict, word="undetermined", best=row, rivals=rivals, text=text)
 
 
 def _named_alone(part: _Member, alone: Mapping[str, Ranked]) -> Ranked:
