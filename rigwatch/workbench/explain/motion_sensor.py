@@ -84,7 +84,7 @@ def motion_sensor_rows(bench: Bench) -> list[Ranked]:
 def _deny_gain(bench: Bench, sensor: MotionSensor, row: Ranked) -> None:
     """Refuse a gain that the sensor of the motion's balance would have shown."""
     healthy = bench.data.healthy
-    if row.placement.name != GAIN or healthy is None:
+    if not row.accepted or row.placement.name != GAIN or healthy is None:
         return
     gain = row.start[row.placement.effect.strength]
     test = with_effects(bench.study.model, bench.data.train)

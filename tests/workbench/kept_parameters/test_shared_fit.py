@@ -1,0 +1,69 @@
+"""How much worse a fit to two recordings may describe the healthy one."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from rigwatch.physics.engine.fit import with_effects
+from rigwatch.workbench.compare import open_bench, shared_bench, spoils_healthy
+from rigwatch.workbench.explain.motion_sensor import motion_sensor_rows
+from tests.workbench.kept_parameters.test_beside_healthy import (
+    CLOSE,
+    MODEL,
+    RATE,
+    UNITS,
+    bench,
+    run,
+)
+from tests.workbench.machine import studied, with_healthy
+from tests.workbench.simulated import with_few_effects
+
+SENSOR = """
+[ports.position_sensor]
+kind = "sensor"
+signal = "position"
+"""
+
+
+@pytest.mark.parametrize(
+    ("healthy", "explains", "spoils"),
+    [
+        pytest.param(1.04, False, False, id="as before"),
+        pytest.param(1.07, False, True, id="worse, for little"),
+        pytest.param(1.07, True, False, id="a little worse, for nearly all of the error"),
+        pytest.param(1.15, True, True, id="much worse"),
+    ],
+)
+def test_the_healthy_recording_may_be_described_a_little_worse_by_what_explains_the_error(
+    tmp_path: Path, healthy: float, *, explains: bool, spoils: bool
+) -> None:
+    both = shared_bench(bench(tmp_path, stiffer=60.0))
+    assert both is not None
+    assert both.bare is not None
+    own, fitted = both.bare.train, both.base
+    first = len(with_effects(both.study.model, both.data.train))
+    residuals = fitted.train.residuals.copy()
+    tail = residuals.reshape(-1, residuals.shape[-1])[first:]
+    tail[:] = (own.residuals / own.scale).reshape(-1, tail.shape[-1])[: len(tail)]
+    tail *= healthy * fitted.train.scale
+    left = fitted.held_out.residuals * (0.0 if explains else 0.9)
+    made = replace(
+        fitted,
+        train=replace(fitted.train, residuals=residuals),
+        held_out=replace(fitted.held_out, residuals=left),
+    )
+    assert spoils_healthy(both, made) == spoils
+
+
+def test_a_fault_of_the_motions_sensor_may_not_spoil_the_healthy_recording_either(
+    tmp_path: Path,
+) -> None:
+    train, held_out = (run(seed, CLOSE, stiffer=-40.0) for seed in (1, 2))
+    made = studied(tmp_path, MODEL + SENSOR, [train], [held_out], UNITS, rates=[RATE, RATE])
+    healthy = with_healthy(made, run(3, CLOSE), UNITS, RATE)
+    both = shared_bench(with_few_effects(open_bench(healthy)))
+    assert both is not None
+    (row,) = motion_sensor_rows(both)
+    assert row.label == "gain@position_sensor"
+    assert row.reason == "the healthy recording is no longer described with it"
