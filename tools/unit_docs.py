@@ -19,8 +19,9 @@ and the ledger have them in SI, with the unit named.
 * Products by a space, `*` or `·`; quotients by `/`, which applies to the next factor only: `N s/m`,
   `m/(s V)`, `kN/mm`. Powers by `^`, also broken ones: `m/s^2`, `l/(min bar^0.5)`, `V^(1/2)`;
   `m/s2` and `m/s²` are read, too. In equations a power is `**`.
-* `g` is the gram; standard gravity is `g0` or `gn`. Accelerometers are often labelled g: `study new`
-  reads `g` beside an acceleration as standard gravity, and a plain import refuses it and suggests `g0`.
+* `g` is the gram; standard gravity is `g0` or `gn`. Accelerometers are often labelled g, which
+  `study new` reads as standard gravity beside an acceleration; an import refuses it and suggests
+  `g0` or `gram`.
 * A temperature that stands alone is absolute: 20 degC are 293.15 K. Within a product it is a
   difference: W/degC is W/K. A difference by itself is written in K.
 * Angles are pure numbers (rad). Hz counts turns and rad/s angles: a channel in one is refused where

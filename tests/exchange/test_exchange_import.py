@@ -123,6 +123,11 @@ def test_g_has_to_say_whether_it_is_gravity_or_the_gram() -> None:
         (GOOD, {"channels": {"force": "u*gtau[N]"}}, "force: found no scalar 'gtau'"),
         (GOOD, {"channels": {}}, "its columns are t, qm, u; expected --map 'CHANNEL=COLUMN"),
         (GOOD, {"time": "time[s]"}, "time: found no column 'time'"),
+        (
+            GOOD.replace("qm", "arm [g]"),
+            {"channels": {"position": "arm [g0]"}},
+            "found no column 'arm', expected 'arm [g]' with its own brackets, or one of t, arm [g]",
+        ),
         (GOOD, {"time": "t[m]"}, "time: found the unit 'm', expected one of s, ms"),
         (GOOD, {"time": ""}, "found neither time nor rate"),
         (GOOD, {"rate": 1.0}, "found 1000 Hz in the time stamps, expected 1 Hz"),

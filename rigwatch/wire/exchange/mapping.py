@@ -104,8 +104,11 @@ def parse_source(channel: str, text: str, columns: tuple[str, ...]) -> Source:
     parts = _SCALED.match(source)
     column = parts["column"] if parts else source
     if parts is None or column not in columns:
+        begun = next((name for name in columns if name.startswith(f"{column} [")), "")
+        expected = f"expected {begun!r} with its own brackets, or " if begun else "expected "
         raise ImportDataError(
-            f"{channel}: found no column {column!r}, expected one of {', '.join(columns) or 'none'}"
+            f"{channel}: found no column {column!r}, {expected}one of"
+            f" {', '.join(columns) or 'none'}"
         )
     factor, offset = _factor(parts["factor"]), _offset(parts["sign"], parts["offset"])
     if not all(math.isfinite(x) for x in (factor, offset) if isinstance(x, float)):
