@@ -317,9 +317,22 @@ def _trains_better(first: Explained, row: Ranked) -> bool:
 
 
 def _leaves_less(first: Explained, row: Ranked) -> bool:
-    """Whether an effect leaves less than what was named before, alone or in a set that it leads."""
+    """Whether an effect leaves less than what was named before, alone or in a set that it leads.
+
+    Where none was, the training may ask for an effect that what is held out shows only beside
+    another, as a drift beside a dead band.
+    """
     named = first.explanation.verdict in STRENGTH_TOLD
-    return row.accepted and not (named and row.held_out_error > first.rows[0].held_out_error)
+    if not row.accepted:
+        return not named and _certainly_trains(first.bench, row)
+    return not (named and row.held_out_error > first.rows[0].held_out_error)
+
+
+def _certainly_trains(bench: Bench, row: Ranked) -> bool:
+    """Whether an effect explains half of the training's error above noise, and not by chance."""
+    if row.fitted is None or row.p_value >= SHOWN:
+        return False
+    return bench.floor.of_training.left_over(bench.base.train, row.fitted.train) <= HALF
 
 
 def _halves(first: Explained, row: Ranked) -> bool:

@@ -13,6 +13,7 @@ from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.data import RESAMPLED, NoiseFloor
 from rigwatch.workbench.explain.contradicting import explaining_all, leaves_less_of_all
 from rigwatch.workbench.explain.credibility import unless_resampled
+from rigwatch.workbench.explain.explain import _leaves_less
 from rigwatch.workbench.explain.indistinguishable import undistinguished
 from rigwatch.workbench.explain.only_training import undetermined_if_training_asks
 from rigwatch.workbench.explain.remaining_error import remaining_share
@@ -915,6 +916,31 @@ def test_an_effect_that_equally_good_sets_replace_is_not_said_to_be_missing(inst
     else:
         assert (found.word, found.rivals) == ("undetermined", (instead,))
         assert found.text == "convection@x and radiation@x explain it equally well"
+
+
+@pytest.mark.parametrize(
+    ("after", "p_value", "verdict", "asked"),
+    [
+        pytest.param(1.3, 1e-9, "unknown_effect", True, id="most of the training"),
+        pytest.param(2.8, 1e-9, "unknown_effect", False, id="little of it"),
+        pytest.param(1.3, 0.01, "unknown_effect", False, id="by chance"),
+        pytest.param(1.3, 1e-9, "missing_effect", False, id="another is named"),
+    ],
+)
+def test_a_rarer_effect_that_the_training_asks_for_is_tried_beside_others(
+    after: float, p_value: float, verdict: str, *, asked: bool
+) -> None:
+    """As a drift that what is held out shows only beside a dead band."""
+    rarer = row("gain_drift@fan", 2.9, accepted=False)
+    assert rarer.fitted is not None
+    rarer.fitted = replace(rarer.fitted, train=base(after).train)
+    rarer.p_value = p_value
+    first: Any = SimpleNamespace(
+        explanation=SimpleNamespace(verdict=verdict),
+        bench=SimpleNamespace(base=base(), floor=PERIODS),
+        rows=[row("offset@fan", 2.5)],
+    )
+    assert _leaves_less(first, rarer) == asked
 
 
 @pytest.mark.parametrize(
