@@ -58,6 +58,7 @@ def test_what_only_one_recording_can_have_is_refused(recordings, capsys):
     assert "expected .jsonl or .parquet" in capsys.readouterr().err
 
 
+@pytest.mark.nightly  # two explanations by the whole library; other jobs' bits are compared by day
 def test_studies_give_the_same_bits_alone_and_in_processes(tmp_path, capsys):
     made = make_study(tmp_path / "studies" / "one")
     (tmp_path / "studies" / "broken").mkdir()

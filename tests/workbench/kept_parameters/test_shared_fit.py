@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from rigwatch.physics.engine.fit import with_effects
-from rigwatch.workbench.compare import open_bench, shared_bench, spoils_healthy
+from rigwatch.workbench.compare import Bench, open_bench, shared_bench, spoils_healthy
 from rigwatch.workbench.explain.motion_sensor import motion_sensor_rows
 from tests.workbench.kept_parameters.test_beside_healthy import (
     CLOSE,
@@ -26,6 +26,14 @@ signal = "position"
 """
 
 
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    """A stiffer slide and the healthy one in one training."""
+    found = shared_bench(bench(tmp_path_factory.mktemp("slide"), stiffer=60.0))
+    assert found is not None
+    return found
+
+
 @pytest.mark.parametrize(
     ("healthy", "explains", "spoils"),
     [
@@ -36,10 +44,8 @@ signal = "position"
     ],
 )
 def test_the_healthy_recording_may_be_described_a_little_worse_by_what_explains_the_error(
-    tmp_path: Path, healthy: float, *, explains: bool, spoils: bool
+    both: Bench, healthy: float, *, explains: bool, spoils: bool
 ) -> None:
-    both = shared_bench(bench(tmp_path, stiffer=60.0))
-    assert both is not None
     assert both.bare is not None
     own, fitted = both.bare.train, both.base
     first = len(with_effects(both.study.model, both.data.train))
