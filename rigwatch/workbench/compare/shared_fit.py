@@ -34,12 +34,20 @@ def shared_bench(bench: Bench) -> Bench | None:
 def refuse_what_spoils(both: Bench, rows: Iterable[Ranked]) -> None:
     """Refuse effects beside which the parameters no longer describe the healthy recording.
 
+    What explains the error may leave that a little worse described (`NEARLY_AS_BEFORE`), unless an
+    effect that explains it leaves it as before.
+
     Args:
-        both: of `shared_bench`.
+        both: of `shared_bench`; nothing is spoilt if its training does not hold that recording.
         rows: of its ranking.
     """
-    for row in rows:
-        if row.accepted and row.fitted is not None and spoils_healthy(both, row.fitted):
+    if both.study.model.presence is None:
+        return
+    fits = [(row, row.fitted) for row in rows if row.accepted and row.fitted is not None]
+    ratios = [(row, _healthy_error(both, fitted), _explains(both, fitted)) for row, fitted in fits]
+    kept = any(ratio <= AS_BEFORE and explains for _, ratio, explains in ratios)
+    for row, ratio, explains in ratios:
+        if ratio > (NEARLY_AS_BEFORE if explains and not kept else AS_BEFORE):
             row.accepted, row.reason = False, REFUSED
 
 
@@ -50,13 +58,19 @@ def spoils_healthy(bench: Bench, fitted: Fitted) -> bool:
         bench: the study; nothing is spoilt if its training does not hold the healthy recording.
         fitted: its model with effects.
     """
-    if bench.study.model.presence is None:
-        return False
+    return bench.study.model.presence is not None and _healthy_error(bench, fitted) > AS_BEFORE
+
+
+def _healthy_error(bench: Bench, fitted: Fitted) -> float:
+    """The healthy recording's error over that of the parameters' own fit to it."""
     assert bench.bare is not None
     first = len(with_effects(bench.study.model, bench.data.train))
-    ratio = _size(fitted.train, first) / _size(bench.bare.train, 0)
+    return _size(fitted.train, first) / _size(bench.bare.train, 0)
+
+
+def _explains(bench: Bench, fitted: Fitted) -> bool:
     left = bench.floor.beyond_own_error(bench.base.held_out, fitted.held_out, fitted.calm)
-    return ratio > (NEARLY_AS_BEFORE if left <= EXPLAINED else AS_BEFORE)
+    return left <= EXPLAINED
 
 
 def fitted_beside_healthy(bench: Bench, row: Ranked) -> tuple[Bench, Ranked] | None:

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from rigwatch.physics.engine.fit import with_effects
-from rigwatch.workbench.compare import Bench, open_bench, shared_bench, spoils_healthy
+from rigwatch.workbench.compare import Bench, open_bench, refuse_what_spoils, shared_bench
 from rigwatch.workbench.explain.motion_sensor import motion_sensor_rows
+from rigwatch.workbench.ranking import Ranked, rank_all
 from tests.workbench.kept_parameters.test_beside_healthy import (
     CLOSE,
     MODEL,
@@ -46,6 +47,23 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> Bench:
 def test_the_healthy_recording_may_be_described_a_little_worse_by_what_explains_the_error(
     both: Bench, healthy: float, *, explains: bool, spoils: bool
 ) -> None:
+    row = beside(both, healthy, explains=explains)
+    refuse_what_spoils(both, [row])
+    assert row.accepted != spoils
+
+
+@pytest.mark.parametrize(("other", "spoils"), [(True, True), (False, False)])
+def test_what_explains_the_error_and_leaves_the_healthy_recording_as_before_is_preferred(
+    both: Bench, *, other: bool, spoils: bool
+) -> None:
+    worse, as_before = beside(both, 1.07, explains=True), beside(both, 1.0, explains=other)
+    refuse_what_spoils(both, [worse, as_before])
+    assert as_before.accepted
+    assert worse.accepted != spoils
+
+
+def beside(both: Bench, healthy: float, *, explains: bool) -> Ranked:
+    """An effect that leaves so much of the healthy recording, over its own fit."""
     assert both.bare is not None
     own, fitted = both.bare.train, both.base
     first = len(with_effects(both.study.model, both.data.train))
@@ -54,12 +72,14 @@ def test_the_healthy_recording_may_be_described_a_little_worse_by_what_explains_
     tail[:] = (own.residuals / own.scale).reshape(-1, tail.shape[-1])[: len(tail)]
     tail *= healthy * fitted.train.scale
     left = fitted.held_out.residuals * (0.0 if explains else 0.9)
-    made = replace(
+    (row,) = rank_all(both.study, both.data, both.base)[:1]
+    row.accepted = True
+    row.fitted = replace(
         fitted,
         train=replace(fitted.train, residuals=residuals),
         held_out=replace(fitted.held_out, residuals=left),
     )
-    assert spoils_healthy(both, made) == spoils
+    return row
 
 
 def test_a_fault_of_the_motions_sensor_may_not_spoil_the_healthy_recording_either(

@@ -89,7 +89,10 @@ def test_why_a_part_of_a_log_is_left_out_is_said(
     assert main([*made, *logs]) == 0
     said = capsys.readouterr()
     assert re.search(r"run\d.csv from 0 s to \S+ s, as nothing moves after", said.err)
-    assert "set known values with --set G=VALUE, or --set LOG:G=VALUE where logs differ" in said.err
+    assert (
+        "give this machine's values with --set G=VALUE, or --set LOG:G=VALUE where logs differ"
+        in said.err
+    )
 
 
 @pytest.mark.parametrize(("logs", "held_out"), [(2, 1), (5, 1), (6, 2), (8, 2), (16, 4)])

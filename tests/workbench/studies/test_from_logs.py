@@ -120,7 +120,7 @@ def test_columns_without_names_are_named_by_an_option(tmp_path, run):
 @pytest.mark.parametrize(
     ("columns", "more", "said"),
     [
-        pytest.param(("time_s", "a", "b"), MOTOR, "--map voltage=COLUMN[V]", id="no such column"),
+        pytest.param(("time_s", "a", "b"), MOTOR, "--map 'voltage=COLUMN[V]'", id="no such column"),
         pytest.param((), ["--model", "moter"], "did you mean 'motor'", id="no such model"),
         pytest.param((), [], "--model", id="no model"),
         pytest.param((), [*MOTOR, "--set", "R"], "expected NAME=VALUE", id="no value"),
