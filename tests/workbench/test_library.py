@@ -27,7 +27,14 @@ def test_every_effect_of_the_library_is_hidden_somewhere() -> None:
     assert set(HIDDEN) == set(library()) - HELD_ALREADY
 
 
-@pytest.mark.parametrize("name", sorted(HIDDEN))
+def _by_night(name: str) -> tuple[pytest.MarkDecorator, ...]:
+    """The rarer half of the library is tried by night: all together take a minute."""
+    return (pytest.mark.nightly,) if library()[name].elective else ()
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=_by_night(name)) for name in sorted(HIDDEN)]
+)
 def test_an_effect_is_named_first_or_in_the_class_of_the_first(name: str) -> None:
     tried = specimen(name)
     made = tried.record(1, hidden=True, samples=SAMPLES)
