@@ -306,6 +306,7 @@ def frozen(rig: Field, boot: int, first: int, last: int) -> None:
         assert (values == values[0]).all(), "frozen and bounded"
 
 
+@pytest.mark.nightly  # half a minute of a rig; one that stands still is tried by day
 def test_36_a_rig_that_is_driven_and_stands_still(rig: Field, device: SerialDevice) -> None:
     ready(rig, device)
     held = Standstill(slice(POSITION, None))

@@ -135,6 +135,7 @@ def _is_taken(taken: socket.socket, port: int) -> bool:
     return True
 
 
+@pytest.mark.nightly  # half a minute of a whole rig; a router that restarts is tried by day
 def test_52_a_router_that_stays_away_for_long(rig: SupervisedRig) -> None:
     rig.goes_on()
     first, began = rig.device.device.next_seq, time.time()

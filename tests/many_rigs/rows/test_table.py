@@ -32,7 +32,8 @@ from tests.many_rigs.rows.memory_links import MemoryLinks
 from tests.monitor.monitor_rig import OTHER_SINE, SINE, block, friction, model, run
 from tests.waiting import PATIENCE, eventually, wait_until
 
-pytestmark = pytest.mark.long
+# In one worker with the processes of many rigs, which compile the same kernels.
+pytestmark = [pytest.mark.long, pytest.mark.xdist_group("many-rigs")]
 SECONDS, SIZES = 12.0, (8, 9, 9, 10)
 
 

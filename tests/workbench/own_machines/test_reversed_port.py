@@ -12,7 +12,7 @@ from tests.workbench.own_machines.test_noisier_training import DAMPER, run
 UNITS = {"v": "m/s", "force": "N"}
 
 
-@pytest.mark.parametrize("noise", [0.01, 0.1])
+@pytest.mark.parametrize("noise", [0.01, pytest.param(0.1, marks=pytest.mark.nightly)])
 def test_a_port_of_the_wrong_sign_is_told_and_no_effect_is_named(
     tmp_path: Path, noise: float
 ) -> None:
