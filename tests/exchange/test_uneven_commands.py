@@ -62,3 +62,16 @@ def test_a_command_that_stays_is_the_same_number(uneven, tmp_path):
     voltage, _, _ = columns(tmp_path / "study" / "run.mcap")
     given = np.unique(np.loadtxt(uneven, delimiter=",", skiprows=1)[:, 1])
     assert 0.5 < np.mean(np.isin(voltage, given)) < 1
+
+
+@pytest.mark.parametrize(("missing", "told"), [(False, True), (True, False)])
+def test_it_is_told_by_what_a_command_is_resampled(tmp_path, missing, told):
+    """Of a log that only lacks samples, the others stay as they are, and those are interpolated."""
+    times = np.arange(400) * STEP
+    times = np.delete(times, [100, 101]) if missing else times + 0.4 * STEP * (np.arange(400) % 2)
+    path = tmp_path / "run.csv"
+    np.savetxt(path, np.stack([times, times], axis=1), delimiter=",", header="t,u", comments="")
+    mapping = ImportMapping(channels={"u": "u[V]"}, time="t[s]", held=("u",))
+    notes = open_session(import_file(path, tmp_path / "run.mcap", mapping).path).info.notes
+    assert "by linear interpolation" in notes
+    assert ("u by means over each step" in notes) == told

@@ -42,6 +42,11 @@ class Grid:
     own: NDArray[np.bool_]
     steps_s: tuple[float, float]
 
+    @property
+    def averages_held(self) -> bool:
+        """Whether a held channel is its mean until the next point: no point has its own sample."""
+        return not self.own.any()
+
 
 def fit_grid(times: FloatArray, rate: float | None, max_hole: float) -> Grid:
     """The uniform grid of a recording's time stamps.

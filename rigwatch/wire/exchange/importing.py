@@ -101,7 +101,8 @@ def _time_base(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[s
     span = f"{shortest * 1e3:.3g} to {longest * 1e3:.3g} ms"
     if shortest >= 1:
         span = f"{shortest:.3g} to {longest:.3g} s"
-    held = f", {' and '.join(mapping.held)} by means over each step" if mapping.held else ""
+    by_means = mapping.held if grid.averages_held else ()
+    held = f", {' and '.join(by_means)} by means over each step" if by_means else ""
     remark = (
         f"time stamps in steps of {span}: {len(times)} samples resampled to {len(grid.times)}"
         f" at {grid.rate_hz:g} Hz by linear interpolation{held}"
@@ -226,7 +227,7 @@ def _resampled(column: Column, grid: Grid, times: FloatArray, *, held: bool) -> 
     missing = column.quality != quality.GOOD
     if missing.all():
         found = np.full(len(grid.times), np.nan)
-    elif held and not grid.own.any():
+    elif held and grid.averages_held:
         found = mean_while_held(grid, times[~missing], column.values[~missing])
     else:
         found = np.interp(grid.times, times[~missing], column.values[~missing])

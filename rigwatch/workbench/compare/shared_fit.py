@@ -15,7 +15,7 @@ from rigwatch.workbench.ranking import MATERIAL, STEP, Ranked, difference, refit
 AS_BEFORE = 1.05
 """Largest ratio of the healthy recording's error to that of the parameters' own fit to it: the
 allowance of the noise floor along a healthy motion."""
-NEARLY_AS_BEFORE, EXPLAINED = 1.1, 0.03
+NEARLY_AS_BEFORE, LEFT = 1.1, 0.03
 """That ratio where the effect explains the error: it leaves at most this share of its energy beyond
 the model's own. A model that is a little wrong fits each motion alone a little better than both."""
 REFUSED = "the healthy recording is no longer described with it"
@@ -70,7 +70,7 @@ def _healthy_error(bench: Bench, fitted: Fitted) -> float:
 
 def _explains(bench: Bench, fitted: Fitted) -> bool:
     left = bench.floor.beyond_own_error(bench.base.held_out, fitted.held_out, fitted.calm)
-    return left <= EXPLAINED
+    return left <= LEFT
 
 
 def fitted_beside_healthy(bench: Bench, row: Ranked) -> tuple[Bench, Ranked] | None:

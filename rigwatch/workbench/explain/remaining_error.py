@@ -92,19 +92,10 @@ def remaining_error(base: Fitted, row: Ranked, floor: NoiseFloor) -> str:
         return f"; it raises the {of} to {times:.2g} times the noise floor"
     if share:
         told = f"; {share:.0%} of the {of}'s energy remains, {times:.2g} times the noise floor"
-        only = _only_held_out_lacks(base, row, floor)
+        only = not train and held_out > LITTLE and _trains(base, floor.of_training)
         return told + (f", but next to nothing of the training's; {GOES_ELSEWHERE}" if only else "")
     above = floor.own_error is None and floor.ratio(fitted) > NEAR
     return f"; what is left is {times:.2g} times the noise floor: {AGAIN}" if above else ""
-
-
-def _only_held_out_lacks(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
-    """Whether an effect explains the error of the training, and little of that held out."""
-    trained = floor.of_training
-    if trained.method == "healthy motion" or trained.reached(base.train):
-        return False
-    explained = _remaining_in_training(base, row, floor) == 0.0
-    return explained and _remaining_held_out(base, row, floor) > LITTLE
 
 
 def _remaining_held_out(base: Fitted, row: Ranked, floor: NoiseFloor) -> float:
@@ -118,11 +109,15 @@ def _remaining_in_training(base: Fitted, row: Ranked, floor: NoiseFloor) -> floa
     """The same of the training."""
     assert row.fitted is not None
     floor = floor.of_training
-    at_floor = floor.reached(base.train) or floor.reached(row.fitted.train)
-    if floor.method == "healthy motion" or at_floor:
+    if not _trains(base, floor) or floor.reached(row.fitted.train):
         return 0.0
     share = floor.left_over(base.train, row.fitted.train)
     return share if share > 1 - EXPLAINED else 0.0
+
+
+def _trains(base: Fitted, floor: NoiseFloor) -> bool:
+    """Whether the training's error is above its floor, and told by that."""
+    return floor.method != "healthy motion" and not floor.reached(base.train)
 
 
 def other_accepted(rows: Sequence[Ranked], named: Sequence[str]) -> str:

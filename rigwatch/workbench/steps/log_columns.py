@@ -170,7 +170,7 @@ def _derived(
         (rates[channel],) = made
     if unknown:
         named = " and ".join(told for told, *_ in unknown)
-        options = _options([(option, fit) for _, option, fit in unknown])
+        options = _options(unknown)
         raise ModelError(
             f"found no unique column for {named} among {', '.join(columns)}; expected {options}"
         )
@@ -370,10 +370,10 @@ def _header_typed(text: str, headers: Sequence[Header]) -> Header | None:
     return next((h for h in headers if "".join(h.column.split()) == packed), None)
 
 
-def _no_unit(header: Header, option: str) -> str:
+def _no_unit(header: Header, expected: str) -> str:
     return (
         f"{header.column}: found {header.unknown!r} in the header's brackets, which is no unit that"
-        f" is known; expected {option}"
+        f" is known; expected {expected}"
     )
 
 
@@ -420,11 +420,11 @@ def _unknown(
     return f"{name} [{unit}]{rate}", option, fit
 
 
-def _options(unknown: Sequence[tuple[str, tuple[str, ...]]]) -> str:
-    """Options that name columns; columns that suit several signals are told once."""
+def _options(unknown: Sequence[tuple[str, str, tuple[str, ...]]]) -> str:
+    """The options of `_unknown` signals; columns that suit several of them are told once."""
     told = list[str]()
-    for fit in dict.fromkeys(fit for _, fit in unknown):
-        options = [option for option, own in unknown if own == fit]
+    for fit in dict.fromkeys(fit for *_, fit in unknown):
+        options = [option for _, option, own in unknown if own == fit]
         if fit and len(options) == 1:
             told.append(" or ".join(options[0].replace("COLUMN", column) for column in fit))
         else:

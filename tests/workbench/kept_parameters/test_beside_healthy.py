@@ -85,10 +85,15 @@ def run(
     return {"u": u[steady], "position": read[steady, 0], "acceleration": read[steady, 1]}
 
 
-def bench(folder: Path, lines: tuple[float, float] = APART, **hidden: float) -> Bench:
-    """A study of the machine with something hidden in it, and of the healthy one, fitted."""
+def bench(
+    folder: Path, lines: tuple[float, float] = APART, ports: str = "", **hidden: float
+) -> Bench:
+    """A study of the machine with something hidden in it, and of the healthy one, fitted.
+
+    `ports` are further ones of the model.
+    """
     train, held_out = (run(seed, lines, **hidden) for seed in (1, 2))
-    made = studied(folder, MODEL, [train], [held_out], UNITS, rates=[RATE, RATE])
+    made = studied(folder, MODEL + ports, [train], [held_out], UNITS, rates=[RATE, RATE])
     return with_few_effects(open_bench(with_healthy(made, run(3, lines), UNITS, RATE)))
 
 

@@ -6,19 +6,10 @@ from pathlib import Path
 import pytest
 
 from rigwatch.physics.engine.fit import with_effects
-from rigwatch.workbench.compare import Bench, open_bench, refuse_what_spoils, shared_bench
+from rigwatch.workbench.compare import Bench, refuse_what_spoils, shared_bench
 from rigwatch.workbench.explain.motion_sensor import motion_sensor_rows
 from rigwatch.workbench.ranking import Ranked, rank_all
-from tests.workbench.kept_parameters.test_beside_healthy import (
-    CLOSE,
-    MODEL,
-    RATE,
-    UNITS,
-    bench,
-    run,
-)
-from tests.workbench.machine import studied, with_healthy
-from tests.workbench.simulated import with_few_effects
+from tests.workbench.kept_parameters.test_beside_healthy import CLOSE, bench
 
 SENSOR = """
 [ports.position_sensor]
@@ -85,10 +76,7 @@ def beside(both: Bench, healthy: float, *, explains: bool) -> Ranked:
 def test_a_fault_of_the_motions_sensor_may_not_spoil_the_healthy_recording_either(
     tmp_path: Path,
 ) -> None:
-    train, held_out = (run(seed, CLOSE, stiffer=-40.0) for seed in (1, 2))
-    made = studied(tmp_path, MODEL + SENSOR, [train], [held_out], UNITS, rates=[RATE, RATE])
-    healthy = with_healthy(made, run(3, CLOSE), UNITS, RATE)
-    both = shared_bench(with_few_effects(open_bench(healthy)))
+    both = shared_bench(bench(tmp_path, CLOSE, ports=SENSOR, stiffer=-40.0))
     assert both is not None
     (row,) = motion_sensor_rows(both)
     assert row.label == "gain@position_sensor"

@@ -64,7 +64,7 @@ class _PortSignals:
         }
         if "v" in variables and shown.get("x") is None:
             variables["x"] = _travel(variables["v"], self._recording)
-        signal = self._varying(port) if port.signal else None
+        signal = self._arriving(name, port) if port.signal else None
         return sizes_at_port(variables, signal, self._recording.dt)
 
     def _known(self, states: FloatArray) -> dict[str, FloatArray]:
@@ -85,10 +85,11 @@ class _PortSignals:
             arriving(self._model, port), signals, self._values, f"port signal {port.signal}"
         )
 
-    def _varying(self, port: Port) -> FloatArray:
+    def _arriving(self, name: str, port: Port) -> FloatArray:
         """What arrives at a port; of a run where nobody measures it, as behind a servo's lag."""
-        found = self._signal(port, self._measured)
-        return found if np.ptp(found) > 0 else self._signal(port, self._simulated)
+        found = self._measured[name]
+        measured = port.signal in self._model.inputs or port.signal in self._model.outputs
+        return found if measured or np.ptp(found) > 0 else self._simulated[name]
 
     def _shown_by_channels(self, text: str) -> FloatArray | None:
         """A variable as channels show it, shape (n,); None of one such as the twist of a shaft."""
