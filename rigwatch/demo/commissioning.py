@@ -70,6 +70,7 @@ def ensure_model(config: Path, folder: Path, say: Callable[[str], None]) -> Path
     _run(["commission", *roles, "--scheme", "transfer", "--output", model], say)
     # The trial also compiles the monitor's kernels, so that the live monitor starts quickly.
     say(f"  {STEPS} of {STEPS}: trying the model: the monitor runs over the last recording")
+    say("    (the longest of them, as the monitor is compiled first)")
     _run(["replay", sessions["friction"], "--model", model], say)
     stamp.write_text(made_from, encoding="utf-8")
     return model
