@@ -7,8 +7,9 @@ later one is taken only if the error falls much, in training and held out. With 
 order stays: a wrong one among them may be mended by a wrong order.
 
 Where a controller's command follows the motion, an earlier command damps it, so that a later row
-may stand for missing drag. If more than noise is left, each order is asked what its most likely
-effects leave, and the given one stays where they leave less with it.
+may stand for missing drag; so it may for eddy currents, beside which a coil's current rises at
+once. If more than noise is left, each order is asked what its most likely effects leave, and the
+given one stays where they leave less with it.
 """
 
 from dataclasses import replace
@@ -102,13 +103,13 @@ def _explains_more_as_given(
     """Whether an effect leaves much less with the rows as they are than any with later ones."""
     data, after = later
     floor = held_out_floor(study, data, after.train, after.held_out)
-    if floor.reached(after.held_out):
+    if floor.reached(after.held_out) and floor.of_training.reached(after.train):
         return False
     best = _best_effect(study, *given)
     if best is None or not _much_better(after, best):
         return False
     other = _best_effect(study, *later)
-    return other is None or _much_better(other, best)
+    return other is None or _leaves_much_less(other, best)
 
 
 def _best_effect(study: Study, data: Data, base: Fitted) -> Fitted | None:
@@ -124,6 +125,16 @@ def _best_effect(study: Study, data: Data, base: Fitted) -> Fitted | None:
 def _much_better(before: Fitted, after: Fitted) -> bool:
     sides = (before.train, after.train), (before.held_out, after.held_out)
     return all(_falls_much(*fits) for fits in sides)
+
+
+def _leaves_much_less(one: Fitted, other: Fitted) -> bool:
+    """Whether the other leaves much less of training or held out, and of neither more.
+
+    Slow recordings hardly show in which row an input acts.
+    """
+    sides = (one.train, other.train), (one.held_out, other.held_out)
+    more = any(difference(*fits).relative < 0.0 for fits in sides)
+    return not more and any(_falls_much(*fits) for fits in sides)
 
 
 def _falls_much(before: Fit, after: Fit) -> bool:
