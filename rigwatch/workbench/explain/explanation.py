@@ -97,6 +97,9 @@ class Explanation:
             explains the error; None if none does, or if that was not asked.
         on_bound: names of the named effect's own parameters that are on a bound.
         tried_rarer: whether the library's rarer effects were tried in a second pass.
+        together: parameters of effects that are missing at once, by "effect@port", from the fit
+            with all of them; empty if one is missing. A row of `ranking` has those that an effect
+            has alone, in which it stands for the others as well.
     """
 
     verdict: str
@@ -117,6 +120,7 @@ class Explanation:
     altered: list[str] = field(default_factory=list)
     on_bound: list[str] = field(default_factory=list)
     tried_rarer: bool = False
+    together: dict[str, dict[str, Value]] = field(default_factory=dict)
 
 
 def explanation(
@@ -164,6 +168,7 @@ def explanation(
         remains=remains,
         altered=list(bench.data.altered),
         on_bound=_on_bound(verdict),
+        together=_together(fitted_in or bench, verdict),
     )
 
 
@@ -184,6 +189,19 @@ def _of_the_strength(bench: Bench, verdict: Verdict) -> tuple[dict[str, float], 
         return {}, []
     more = added_variances(bench.study, bench.data, bench.bare, best.fitted)
     return more, list(unweighed(bench, best.placement, best.fitted, more))
+
+
+def _together(bench: Bench, verdict: Verdict) -> dict[str, dict[str, Value]]:
+    """Parameters of effects that are missing at once, by their labels; empty if one is."""
+    best, fitted = verdict.best, verdict.together
+    if best is None or fitted is None or verdict.word not in STRENGTH_TOLD:
+        return {}
+    more = added_variances(bench.study, bench.data, bench.bare, fitted)
+    every = as_written(values(fitted.train, more), fitted.compiled.system)
+    missing = fitted.placements[len(bench.base.placements) :]
+    found = {f"{each.name}@{each.port}": each.own(every) for each in missing}
+    # The text names another of the class than the set has: nothing is known of it in that set.
+    return found if best.label in found else {}
 
 
 def _assumed(study: Study) -> list[str]:

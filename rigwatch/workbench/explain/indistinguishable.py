@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rigwatch.physics.engine.equations import library
 from rigwatch.physics.engine.score import ALIKE
 from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.fit import block_differences
@@ -63,6 +64,25 @@ def undistinguished(
     rivals += _parallel_to_rivals(rows, rivals, {*members, *rivals})
     refining = {row.label for row in rows if row is not best and _lower(row) in members}
     return tuple(label for label in members if label not in refining), tuple(rivals)
+
+
+def plainest(best: Ranked, rows: Sequence[Ranked]) -> Ranked:
+    """Of effects at the best's port that leave the same by as many parameters, the plainest.
+
+    Where a motion never reverses, drag by direction is drag and an asymmetric gain is a gain. The
+    library lists plain laws before those that become the same in a special case.
+    """
+    same = [best, *(row for row in rows if row is not best and _leaves_the_same(best, row))]
+    order = {name: place for place, name in enumerate(library())}
+    return min(same, key=lambda row: order.get(row.effect, len(order)))
+
+
+def _leaves_the_same(best: Ranked, row: Ranked) -> bool:
+    if row.port != best.port or row.free != best.free or row.fitted is None or best.fitted is None:
+        return False
+    train = row.fitted.train_error / best.fitted.train_error
+    ratios = (train, error_ratio(best, row))
+    return all(abs(ratio - 1) < NO_DIFFERENCE for ratio in ratios)
 
 
 def _lower(row: Ranked) -> str:

@@ -30,6 +30,7 @@ from rigwatch.workbench.explain.indistinguishable import (
     at_other_ports,
     equal,
     lead,
+    plainest,
     undistinguished,
 )
 from rigwatch.workbench.explain.remaining_error import (
@@ -79,7 +80,7 @@ class Verdict:
         second: labels of the second missing effect, if two are missing at once.
         evidence: what the verdict is based on.
         beside: labels of the other effects of the set that it was judged in.
-        together: the fit with both effects, if two are missing at once.
+        together: the fit with all effects that are missing at once, if several are.
         alone: whether a second effect was sought that explains what it leaves, and none does.
     """
 
@@ -289,7 +290,7 @@ def _named(base: Fitted, accepted: Sequence[Ranked], floor: NoiseFloor) -> Ranke
     top = lowest(accepted)
     equals = [row for row in accepted if _as_good(base, top, row, floor)]
     least = min(map(_simplicity, equals))
-    best = lowest([row for row in equals if _simplicity(row) == least])
+    best = plainest(lowest([row for row in equals if _simplicity(row) == least]), accepted)
     assert best.fitted is not None
     if floor.reached(best.fitted.held_out):
         return best

@@ -188,16 +188,23 @@ def at_its_bounds(found: Explanation) -> str:
 
 
 def _named_lines(found: Explanation) -> list[str]:
-    """The fitted parameters of the effect that the verdict names."""
+    """The fitted parameters of the effect that the verdict names, and of those beside it."""
     if found.verdict != "missing_effect" or not found.ranking:
         return []
     best = found.ranking[0]
-    fitted = [
+    label = f"{best.effect}@{best.port}"
+    named = {label: found.together.get(label, best.parameters), **found.together}
+    told = [(label, _fitted(own)) for label, own in named.items()]
+    return [f"  {label}: {'; '.join(fitted)}" for label, fitted in told if fitted]
+
+
+def _fitted(parameters: dict[str, Value]) -> list[str]:
+    """Those that were fitted, with their intervals."""
+    return [
         f"{name} = {shown(value)}{f', {value.note}' if value.note else ''}"
-        for name, value in best.parameters.items()
+        for name, value in parameters.items()
         if value.interval is not None
     ]
-    return [f"  {best.effect}@{best.port}: {'; '.join(fitted)}"] if fitted else []
 
 
 def next_command(found: Explanation, study: str) -> str:

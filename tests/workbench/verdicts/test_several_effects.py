@@ -7,11 +7,12 @@ import pytest
 
 from rigwatch.physics.engine.equations.model import model_text
 from rigwatch.workbench.compare import open_bench
-from rigwatch.workbench.explain.explain import ranking
+from rigwatch.workbench.explain.explain import explained, ranking
 from rigwatch.workbench.explain.sets.several_effects import several_effects
 from rigwatch.workbench.explain.verdict import judge
 from rigwatch.workbench.ranking.rank import rank
 from rigwatch.workbench.ranking.refitting import no_progress
+from rigwatch.workbench.report.text_report import explanation_lines
 from sim_plant.machines import MACHINES, log
 from sim_plant.machines import strength_for as machine_strength
 from sim_plant.oscillator import Hidden, strength_for
@@ -50,6 +51,21 @@ def test_one_of_three_hidden_effects_is_named_with_another(three, rows):
     assert found.best in rows
     assert found.evidence.left < 0.02
     assert set(found.beside) == LABELS - set(found.members)
+
+
+def test_each_of_two_effects_has_the_strength_that_it_has_beside_the_other():
+    """Alone one stands for a part of the other, and its interval holds what that makes of it."""
+    true = {name: strength_for(name, FORCE, 0.1) for name in ("quadratic_drag", "dead_band")}
+    bench = fitted(FORCE, tuple(Hidden(*each) for each in true.items()), 2e-3)
+    few = knowing(bench.study, "quadratic_drag", "dead_band", "viscous", "coulomb", "gain", "lag")
+    found = explained(dataclasses.replace(bench, study=few)).explanation
+    assert found.verdict == "missing_effect"
+    assert set(found.together) == {"quadratic_drag@load", "dead_band@drive"}
+    for label, own in found.together.items():
+        assert own["b"].value == pytest.approx(true[label.split("@")[0]], rel=0.005)
+    told = explanation_lines(found)
+    assert sum(line.startswith("  dead_band@drive: b = 0.424") for line in told) == 1
+    assert sum(line.startswith("  quadratic_drag@load: b = 0.258") for line in told) == 1
 
 
 @pytest.mark.nightly

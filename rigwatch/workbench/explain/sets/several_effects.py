@@ -321,6 +321,7 @@ def _set_verdict(
         second=second,
         evidence=Evidence(left, found.evidence.margin),
         beside=others,
+        together=found.best.fitted if found.best is not None else None,
     )
 
 
