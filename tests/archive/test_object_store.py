@@ -87,6 +87,7 @@ QUERY = "select * exclude (stamp) from sessions order by session"
 SECONDS = "select * from seconds order by rig, name, second"
 
 
+@pytest.mark.nightly
 def test_a_bucket_gives_the_answers_of_a_folder(bucket):
     here, there = bucket
     assert index(here).sessions == index(there).sessions == 5

@@ -21,6 +21,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.nightly
 def test_a_damage_is_drawn_with_its_test_instant_and_verdict(record: Path, tmp_path: Path) -> None:
     target = tmp_path / "damage.rrd"
     known = ["structure", "damage", str(KABE), str(record), "--known"]

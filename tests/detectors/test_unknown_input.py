@@ -22,6 +22,7 @@ def healthy():
     return [pendulum.run(40.0, seed=seed) for seed in range(10)]
 
 
+@pytest.mark.nightly
 def test_the_plain_filters_innovations_are_of_the_expected_size(healthy):
     """Mean of 40 000 chi-square values of three degrees of freedom, within four standard errors."""
     nis = np.concatenate([one[0][200:] for one in healthy])

@@ -138,6 +138,7 @@ def test_what_a_person_has_accepted_is_no_alarm_at_the_start_and_ends_one() -> N
     assert not found.monitor.alarms.holds("wiring_drive")
 
 
+@pytest.mark.nightly
 def test_trials_end_and_come_again_as_long_as_the_rig_departs() -> None:
     """Friction hides the drive for a minute and a half; then it is gone, and the drive is named."""
     events = (*coulomb(0.0, 1.5), Event(at_s=90.0, effect="coulomb", value=0.0))

@@ -63,6 +63,7 @@ def sent(block: Block, fate: str, place: int) -> list[bytes]:
     return changed.get(fate, lambda: [data])()
 
 
+@pytest.mark.nightly
 @settings(max_examples=300, deadline=None)
 @given(
     st.sampled_from([SampleBlock, EstimateBlock]),

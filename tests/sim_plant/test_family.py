@@ -54,6 +54,7 @@ def rms(values: Floats) -> float:
     return float(np.std(values))
 
 
+@pytest.mark.nightly
 def test_closed_chambers_swing_as_those_of_the_thesis(member: Member):
     assert 5.0 < member.air_spring_hz < 12.0
 

@@ -65,6 +65,7 @@ def reference() -> NDArray[np.float64]:
     return np.array(rows)
 
 
+@pytest.mark.nightly
 def test_kernel_agrees_with_an_adaptive_solver(reference):
     truth = Rig(P, seed=0).advance(sine(1.4, 8.0, 1.0)).truth
     for column, name in enumerate(("x", "v", "P1", "P2")):

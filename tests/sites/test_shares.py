@@ -1,5 +1,6 @@
 """Recorders that ask one site for its recordings share its rate, however often each asks."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -60,6 +61,7 @@ def test_one_that_asks_no_more_holds_nobody_up_and_one_that_begins_does_not_take
     assert 0.8 < server.served["third"] / (server.served["first"] - before) < 1.25
 
 
+@pytest.mark.nightly
 @given(st.lists(st.tuples(st.text(max_size=3), st.floats(0.0, 0.5)), max_size=200))
 def test_names_without_end_cost_a_bounded_memory_and_somebody_is_served(
     asked: list[tuple[str, float]],

@@ -89,6 +89,7 @@ def test_a_record_with_uneven_time_is_refused(tmp_path):
         read_record(path)
 
 
+@pytest.mark.nightly
 def test_compare_writes_a_page_of_every_method(csv, tmp_path, capsys):
     page = tmp_path / "antenna.html"
     assert main(["structure", "compare", str(FILE), str(csv), "--report", str(page), "--json"]) == 0

@@ -119,6 +119,7 @@ def test_damages_in_sequence_are_found_one_after_the_other(kabe: Structure) -> N
     assert last["k3_5"].value == pytest.approx(700.0, rel=0.01)
 
 
+@pytest.mark.nightly
 def test_gaps_in_the_record_are_bridged(kabe: Structure) -> None:
     record = kabe_record([K4], 0.02, seed=4)
     columns = {name: column.copy() for name, column in record.columns.items()}
@@ -178,6 +179,7 @@ def test_two_springs_at_once_are_both_named(frame_file: Path) -> None:
     assert after == pytest.approx({"lower": 250.0, "top": 120.0}, rel=0.05)
 
 
+@pytest.mark.nightly
 def test_three_springs_at_once_are_not_explained(kabe: Structure) -> None:
     shares = {"k1_2": 0.6, "k3_5": 0.7, "k4_46": 0.5}
     values = coefficients(kabe)

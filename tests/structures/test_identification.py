@@ -88,6 +88,7 @@ def test_nodes_without_a_sensor_are_bridged_in_noise(nodes, noise):
         assert abs(found.parameters["k1_6"] / 1000.0 - 1.0) < 0.01
 
 
+@pytest.mark.nightly
 def test_a_chaotic_record_in_noise_is_not_fitted_at_a_wrong_minimum():
     load, truth = {"node": "6", "step": 1000.0}, TRUTH | {"k1_6_cubic": 10000.0}
     made = simulate(FILE, 0.01, 10.0, loads={"push": load}, values={"springs.k1_6.cubic": 1e4})

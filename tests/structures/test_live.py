@@ -86,6 +86,7 @@ def test_undamaged_noise_alarms_nobody() -> None:
         assert estimates(quiet)[-1].max() < 1.0
 
 
+@pytest.mark.nightly
 def test_lost_and_invalid_samples_are_bridged_and_a_restart_begins_anew(damaged: Record) -> None:
     live, said = LiveDamage(load_structure(KABE), 0.01, KNOWN), list[Said]()
     for part in cuts(damaged, 20):

@@ -107,6 +107,7 @@ def test_bit_flips_anywhere(flips: list[tuple[int, int]]) -> None:
         check(bytes(data), touched, Path(folder))
 
 
+@pytest.mark.nightly
 def test_a_flip_of_each_bit_of_every_record_head(tmp_path: Path) -> None:
     """The file's first record; a chunk in the middle: opcode, lengths, checksum, what is beside."""
     start, _ = chunk_spans()[5]

@@ -51,6 +51,7 @@ def test_a_slider_that_runs_in_is_offered_in_place_of_a_constant_one(tmp_path: P
     assert values["path"] == pytest.approx(PATH, rel=0.3)
 
 
+@pytest.mark.nightly
 def test_what_explains_a_little_of_an_unknown_rest_is_not_offered(tmp_path: Path) -> None:
     def disturbed(x: np.ndarray, v: np.ndarray) -> np.ndarray:
         since = np.arange(len(x)) / 100

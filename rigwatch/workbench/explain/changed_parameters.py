@@ -4,11 +4,18 @@ A healthy recording fixes the model's own parameters. A fault may change what th
 clogged silencer, a supply that sags, a leaking line. No effect of the library describes that, but
 one that resembles it explains most of the residual, as a gain of a sensor does. The model without
 the effect, its kept parameters free again, then leaves less of the held-out recordings. A true
-effect that is in the library leaves nothing that these parameters could explain beside it.
+effect that is in the library leaves nothing that these parameters could explain beside it, if the
+model is right. A model that is a little wrong is less wrong with other parameters along another
+motion, as beside a spring that holds it back. But a fault changes one thing, which one parameter
+follows: of lower supplies one area leaves as little as a leak does, of springs no parameter but the
+model's own spring comes near. So an effect stands that no single parameter comes near.
 """
 
 from dataclasses import replace
 
+from msgspec import structs
+
+from rigwatch.physics.engine.equations import Model
 from rigwatch.physics.engine.fit import with_effects
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
@@ -17,6 +24,8 @@ from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.fit import Fitted, fit_model, with_kept_free
 from rigwatch.workbench.ranking import Progress, difference
 
+THE_SAME = 1e-3
+"""Relative difference of errors that two names of the same physics leave."""
 CHANCE = 0.1
 """One-sided level at which changed parameters are better: it is higher than that of accepting an
 effect, as a doubt needs less evidence than a name.
@@ -53,6 +62,8 @@ def undetermined_if_parameters_changed(bench: Bench, found: Verdict, progress: P
     changed = _refitted(bench)
     if changed is None or not _explains_more(bench, fitted, changed, little=little):
         return found
+    if not (found.together or _one_comes_near(bench, fitted)):
+        return found
     unit = bench.base.told_in
     text = (
         f"{named} {'lower' if found.together else 'lowers'} the held-out error to"
@@ -64,9 +75,35 @@ def undetermined_if_parameters_changed(bench: Bench, found: Verdict, progress: P
     return replace(found, word="undetermined", text=text)
 
 
-def _refitted(bench: Bench) -> Fitted | None:
-    """The model without the effect, its kept parameters free; None if it cannot be fitted."""
-    loose = replace(bench.study, model=with_kept_free(bench.study.model))
+def _one_comes_near(bench: Bench, named: Fitted) -> bool:
+    """Whether one kept parameter, free alone, leaves hardly more than the effect named.
+
+    One that leaves the same is the effect itself, as the model's own spring is.
+    """
+    model = bench.study.model
+    for name in (name for name, p in model.parameters.items() if p.kept):
+        one = structs.replace(model.parameters[name], fixed=False)
+        loose = structs.replace(model, parameters={**model.parameters, name: one})
+        changed = _refitted(bench, loose)
+        if changed is None or _is_as_large(changed, named):
+            continue
+        if _left(bench, changed) <= _left(bench, named) + SHARE:
+            return True
+    return False
+
+
+def _is_as_large(one: Fitted, other: Fitted) -> bool:
+    return abs(one.held_out_error / other.held_out_error - 1) < THE_SAME
+
+
+def _refitted(bench: Bench, model: Model | None = None) -> Fitted | None:
+    """The model without the effect, its kept parameters free; None if it cannot be fitted.
+
+    Args:
+        bench: the study.
+        model: with others free.
+    """
+    loose = replace(bench.study, model=model or with_kept_free(bench.study.model))
     data = replace(bench.data, train=with_effects(bench.study.model, bench.data.train))
     start, scale = bench.base.train.values(), bench.base.train.scale
     try:

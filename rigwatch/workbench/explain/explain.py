@@ -42,6 +42,7 @@ from rigwatch.workbench.explain.lower_floor import with_lower_floor
 from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
 from rigwatch.workbench.explain.only_training import SHOWN, undetermined_if_training_asks
 from rigwatch.workbench.explain.rough_verdict import (
+    MUCH,
     leaves_much,
     leaves_some,
     limited_verdict,
@@ -78,6 +79,8 @@ BY_CHANCE = 0.05
 """Probability below which a rarer effect's score is more than chance."""
 HALF = 0.5
 """Share of an effect's error above noise that a rarer one in its place may leave."""
+OPEN_STRENGTH = "but the interval of {name} of {label} holds"
+BY_ITSELF = "with the training alone {label} leads, and both leave far more than noise"
 BASE_NOT_CONVERGED = "{why}, but with the effect only noise is left"
 SECOND_PASS = "the effect was found in a second pass"
 TWO_BEYOND_BASE = "two effects at once on a base that was searched for are not told from others"
@@ -149,8 +152,26 @@ def _beside_healthy(first: Explained, progress: Progress) -> Explained:
     if not _names_more(first.explanation, second.explanation):
         return first
     own, found = first.explanation.comparison, unless_two(second.explanation)
+    if (before := _another_before(first, second)) and found.verdict == "missing_effect":
+        text = f"{found.text}; {BY_ITSELF.format(label=before)}"
+        found = _unsure(replace(found, text=text, rivals=[*found.rivals, before]))
     compared = replace(own, remarks=found.comparison.remarks)
     return replace(second, bench=first.bench, explanation=replace(found, comparison=compared))
+
+
+def _another_before(first: Explained, second: Explained) -> str:
+    """Label of another effect that led before, if what is named now leaves far more than noise.
+
+    Parameters that are free of the healthy recording may favour either law then, as of dry friction
+    one that grows with pressure.
+    """
+    led, named = first.rows[0], second.rows[0]
+    if not led.accepted or named.fitted is None:
+        return ""
+    told = second.explanation.ranking[0]
+    same = led.label in {named.label, *told.class_, *second.explanation.rivals}
+    much = second.bench.floor.ratio(named.fitted.held_out, named.fitted.calm) > MUCH
+    return led.label if much and not same else ""
 
 
 def _names_more(first: Explanation, second: Explanation) -> bool:
@@ -181,6 +202,24 @@ def unless_two(found: Explanation) -> Explanation:
     if not found.also:
         return found
     return _unsure(replace(found, text=f"{found.text}; {TWO_BEYOND_BASE}"))
+
+
+def _unless_open(found: Explanation, verdict: Verdict) -> Explanation:
+    """What is named with several effects; undetermined if one of them may have no strength.
+
+    Of a supply that sags, a friction whose interval holds zero takes what a sensor's gain leaves.
+    """
+    if found.verdict != "missing_effect" or not found.together or verdict.together is None:
+        return found
+    for placement in verdict.together.placements:
+        label, effect = f"{placement.name}@{placement.port}", placement.effect
+        p, own = effect.parameters[effect.strength], found.together.get(label, {})
+        value = own.get(effect.strength)
+        interval = value.interval if value is not None else None
+        if interval is not None and interval[0] <= p.neutral <= interval[1]:
+            text = f"{found.text}; {OPEN_STRENGTH.format(label=label, name=effect.strength)}"
+            return _unsure(replace(found, text=f"{text} {p.neutral:g}"))
+    return found
 
 
 def _unsure(found: Explanation) -> Explanation:
@@ -377,7 +416,7 @@ def _explained_once(
     if verdict.word in STRENGTH_TOLD and bench.data.along_motion and healthy:
         progress("finding what the healthy recording leaves open of the strength")
     fitted_in, rows, verdict = _with_closer_strength(bench, rows, verdict)
-    found = explanation(bench, rows, verdict, fitted_in)
+    found = _unless_open(explanation(bench, rows, verdict, fitted_in), verdict)
     if not (bench.study.file.effects and _asks_for_exchange(bench, verdict)):
         return Explained(bench, rows, found)
     offer = first.offer if first is not None and first.sought else exchange(bench, progress)

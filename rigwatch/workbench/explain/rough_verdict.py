@@ -105,14 +105,18 @@ def leaves_some(base: Fitted, floor: NoiseFloor, found: Verdict) -> bool:
     """Whether the single effect named leaves a share above the floor that another may explain.
 
     Where noise is most of the floor, as mains hum, the ratio of the error to it hides that share.
-    By frequency nothing is hidden, and `leaves_much` has judged it.
+    By frequency nothing is hidden, and `leaves_much` has judged it, but of a large error that share
+    is small even where far more than the healthy error is left.
     """
     if found.word != "missing_effect" or found.second or found.best is None:
         return False
     fitted = found.best.fitted
-    if floor.own_error is not None:
+    if fitted is None:
         return False
-    if fitted is None or floor.ratio(fitted.held_out, fitted.calm) <= floor.allowed:
+    ratio = floor.ratio(fitted.held_out, fitted.calm)
+    if floor.own_error is not None:
+        return ratio > MUCH
+    if ratio <= floor.allowed:
         return False
     return floor.left_over(base.held_out, fitted.held_out, fitted.calm) > SHARE
 

@@ -65,6 +65,10 @@ SLIGHT = 0.002
 beyond a simpler one to be named in place of it."""
 MOST_OF_IT = 0.75
 """Share of the best effect's gain that an effect of lower order needs to be named instead."""
+SEVERAL, NEARLY_ALL = 2, 0.98
+"""Further parameters of an effect along the measured motion that a simple one is named in place of,
+and the share of its gain that the simple one needs: a spring gains 99 % of what a contact that
+slips does on a rig that nobody here had built."""
 
 
 @dataclass(frozen=True)
@@ -294,12 +298,30 @@ def _named(base: Fitted, accepted: Sequence[Ranked], floor: NoiseFloor) -> Ranke
     assert best.fitted is not None
     if floor.reached(best.fitted.held_out):
         return best
+    if floor.method == "healthy motion":
+        best = _as_it_acts(best, accepted)
+        assert best.fitted is not None
     lower = best.placement.effect.refines
     for row in accepted:
         if row.effect == lower and row.gain and best.gain and row.gain > MOST_OF_IT * best.gain:
             alone = explains(base, best, floor) and not explains(base, row, floor)
             return best if alone else row
     return best if explains(base, best, floor) else _simpler_of_all(best, accepted)
+
+
+def _as_it_acts(best: Ranked, accepted: Sequence[Ranked]) -> Ranked:
+    """In place of an effect with several more parameters, a simple one at its port that it acts as.
+
+    A contact that hardly slips is a spring. What its further parameters gain beyond the spring is
+    little, and the model's own error, which another motion changes, has room for as much.
+    """
+    simple = [
+        row
+        for row in accepted
+        if row.port == best.port and row.free + SEVERAL <= best.free and not same_family(best, row)
+        if row.gain and best.gain and row.gain > NEARLY_ALL * best.gain
+    ]
+    return min(simple, key=lambda row: (row.free, row.held_out_error), default=best)
 
 
 def _passed_over(best: Ranked, accepted: Sequence[Ranked]) -> Ranked | None:

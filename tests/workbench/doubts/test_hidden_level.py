@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from rigwatch.physics.engine.equations.model import model_text
 from rigwatch.workbench.explain.explain import explain
@@ -38,6 +39,7 @@ def test_a_dead_band_is_named_although_an_offset_is_like_it_to_first_order(tmp_p
     assert 0.98 < found.ranking[0].parameters["b"].value < 1.02
 
 
+@pytest.mark.nightly
 def test_it_is_named_in_a_plant_that_is_integrated_another_way(tmp_path: Path) -> None:
     plant = MACHINES["cascade"]
     hidden = {"dead_band": strength_for(plant, "dead_band", 0.5, seed=1)}

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from rigwatch.workbench.steps.change import add
 from rigwatch.workbench.study import open_study
@@ -40,6 +41,7 @@ def moved(seed: int) -> dict[str, np.ndarray]:
     return {"x": x, "v": v, "force": 0.05 * v + force + 0.05 * draw.normal(size=len(x))}
 
 
+@pytest.mark.nightly
 def test_what_a_better_law_replaces_is_said_to_be_needless(tmp_path: Path) -> None:
     study = studied(tmp_path, DAMPER, [moved(0), moved(1)], [moved(2)], UNITS)
     first = add(study, "jenkins", "rod")

@@ -146,6 +146,7 @@ def rubbing(tmp_path_factory: pytest.TempPathFactory) -> Study:
     return studied(folder, MODEL, tables[:1], tables[1:], UNITS, healthy, (SAMPLED, SAMPLED))
 
 
+@pytest.mark.nightly
 def test_dry_friction_is_named_whatever_push_the_sensor_hides(rubbing: Study) -> None:
     bench = open_bench(rubbing)
     assert bench.data.healthy is not None

@@ -71,6 +71,7 @@ def test_faults_of_sensors_that_another_denies_are_not_fitted_and_say_why() -> N
     assert rows["coulomb@load"].accepted
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_a_sensors_fault_stays_where_the_other_sensor_reads_as_before() -> None:
     of = data(gain=1.7)

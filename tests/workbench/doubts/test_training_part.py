@@ -128,6 +128,7 @@ def test_an_effect_fits_the_part_as_it_does_the_whole(bench: Bench, part: Traini
     assert starts[row.placement.prefix + "Fc"] == pytest.approx(COULOMB, rel=0.05)
 
 
+@pytest.mark.nightly
 def test_hidden_states_that_run_on_are_taken_on_the_part_as_well(tmp_path: Path) -> None:
     train = [log(length, seed, 0.1) for seed, length in enumerate((60, 25))]
     study = studied(tmp_path, UNSEEN, train, [log(20, 9, 0.1)], UNITS, "horizon = 0.5")

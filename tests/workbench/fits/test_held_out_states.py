@@ -108,6 +108,7 @@ def test_a_channel_that_ends_before_the_samples_that_count_is_reported(tmp_path:
         open_bench(study)
 
 
+@pytest.mark.nightly
 def test_with_a_hidden_current_friction_is_named(tmp_path: Path) -> None:
     made = [wound(seed, 1.5) for seed in range(2)]
     found = explain(studied(tmp_path, CURRENT + PORT, made[:1], made[1:], UNITS))

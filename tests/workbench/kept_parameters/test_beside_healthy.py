@@ -119,6 +119,7 @@ def test_a_strength_is_right_although_the_healthy_recording_leaves_the_model_ope
     assert "with the healthy recording in the training to 0.131 m/s^2" in found.text
 
 
+@pytest.mark.nightly
 def test_what_makes_the_healthy_recording_its_own_is_no_rival(tmp_path: Path) -> None:
     made = bench(tmp_path, lines=CLOSE, weaker=0.08, louder=1.12)
     alone = _explained_once(made, no_progress).explanation

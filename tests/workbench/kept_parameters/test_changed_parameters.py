@@ -6,7 +6,10 @@ from pathlib import Path
 import pytest
 
 from rigwatch.workbench.compare import shared_bench
-from rigwatch.workbench.explain.changed_parameters import undetermined_if_parameters_changed
+from rigwatch.workbench.explain.changed_parameters import (
+    _one_comes_near,
+    undetermined_if_parameters_changed,
+)
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.ranking import no_progress
 from tests.workbench.rigs.slides import Hidden, bench
@@ -38,6 +41,23 @@ def test_a_slower_motor_is_no_weaker_one(tmp_path: Path) -> None:
     assert found.word == "undetermined"
     assert "gain@drive lowers the held-out error" in found.text
     assert "parameters of the model" in found.text
+
+
+@pytest.mark.parametrize(
+    ("hidden", "label", "near"),
+    [
+        pytest.param(Hidden(slower=0.15), "gain@drive", True, id="a slower motor"),
+        pytest.param(Hidden(dry=0.15), "coulomb@load", False, id="friction"),
+        pytest.param(Hidden(weaker=0.15), "gain@drive", False, id="its own gain is the effect"),
+    ],
+)
+def test_one_parameter_comes_near_an_effect_that_stands_for_its_change(
+    tmp_path: Path, hidden: Hidden, label: str, near: bool
+) -> None:
+    made = with_few_effects(bench(tmp_path, hidden, DRIVEN))
+    named = next(row.fitted for row in ranking(made)[0] if row.label == label)
+    assert named is not None
+    assert _one_comes_near(made, named) == near
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from rigwatch.physics.engine.fit.recording import Recording, joined
 from rigwatch.workbench.compare.preparation import Bench, bench_of, open_bench
@@ -30,6 +31,7 @@ def bench(sign: float, share: float = 1.0) -> Bench:
     return bench_of(study, Data(train, counted(3, sign, share), None, 40, ()))
 
 
+@pytest.mark.nightly
 def test_with_a_speed_that_is_counted_the_other_way_no_effect_is_named() -> None:
     found = explained(bench(-1.0)).explanation
     assert found.verdict == "model_inadequate"

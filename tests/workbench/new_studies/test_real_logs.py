@@ -25,6 +25,7 @@ KNOWN = {
 }
 
 
+@pytest.mark.nightly
 def test_a_hidden_level_does_not_run_on_through_inputs_that_were_lost(tmp_path: Path) -> None:
     # 15 lost rows are a minute, as long as the tank's time constant: the level after them is not
     # what an interpolated pump gives, and no effect describes the difference.
@@ -56,6 +57,7 @@ def test_half_of_a_window_at_the_end_of_a_recording_counts(tmp_path: Path) -> No
     assert not any("not counted" in remark for remark in data.remarks)
 
 
+@pytest.mark.nightly
 def test_the_ends_that_count_are_those_of_the_first_step_after_it_too(tmp_path: Path) -> None:
     study = made(tmp_path, "motor", 0.005, 1004, saturation=0.1)
     first = open_bench(study).data

@@ -59,6 +59,7 @@ def rubbed(seed: int, friction: float, seconds: float = 25.0, finer: int = 20) -
     return {"current": current, "position": position, "acceleration": acceleration}
 
 
+@pytest.mark.nightly
 def test_a_contact_that_slips_after_a_thousandth_of_the_travel_is_described(tmp_path: Path) -> None:
     tables = [rubbed(seed, FRICTION) for seed in range(2)]
     study = studied(tmp_path, SLIDE, tables[:1], tables[1:], SLIDE_UNITS, rates=[200.0] * 2)

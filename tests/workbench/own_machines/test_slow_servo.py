@@ -47,6 +47,7 @@ def followed(seed: int, rate: float = 100.0, seconds: float = 30.0, finer: int =
     return {"command": command, "angle": angle + 5e-5 * draw.normal(size=len(t))}
 
 
+@pytest.mark.nightly
 def test_an_actuator_that_is_slow_is_told_from_a_command_that_changes_slowly(
     tmp_path: Path,
 ) -> None:

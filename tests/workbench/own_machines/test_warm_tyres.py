@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from rigwatch.workbench.explain.explain import explain
 from tests.workbench.machine import Table, studied
@@ -57,6 +58,7 @@ def driven(seed: int, seconds: float = 250.0) -> Table:
     return {"torque": torque, "grade": grade, "speed": found + NOISE * draw.normal(size=len(t))}
 
 
+@pytest.mark.nightly
 def test_what_a_rarer_effect_explains_better_is_not_named(tmp_path: Path) -> None:
     tables = [driven(seed) for seed in range(3)]
     study = studied(tmp_path, VAN, tables[:2], tables[2:], UNITS, rates=[RATE] * 3)

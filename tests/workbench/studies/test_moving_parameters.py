@@ -76,6 +76,7 @@ def sled(folder: Path, model: str = SLED, friction: float = 1.5) -> Path:
     return folder / "template.toml"
 
 
+@pytest.mark.nightly
 def test_a_tilt_that_moves_is_fitted_per_recording_and_friction_is_named(tmp_path: Path) -> None:
     found = explain(create(tmp_path / "study", sled(tmp_path)))
     assert (found.verdict, found.ranking[0].effect) == ("missing_effect", "coulomb")

@@ -90,6 +90,7 @@ def test_what_is_held_changes_at_the_samples_of_each_recording(tmp_path: Path) -
     assert found.parameters["m"].value == pytest.approx(0.8, rel=2e-3)
 
 
+@pytest.mark.nightly
 def test_a_late_drive_is_found_though_its_sensor_may_be_late_instead(tmp_path: Path) -> None:
     rates, late = (100.0, 101.3, 100.7), 0.0237
     one, other, last = (

@@ -59,6 +59,7 @@ def template(folder: Path, given: str = "m") -> Path:
     return path
 
 
+@pytest.mark.nightly
 def test_what_is_known_of_a_recording_counts_in_it_alone(tmp_path: Path) -> None:
     found = explain(create(tmp_path / "study", template(tmp_path)))
     assert (found.verdict, found.ranking[0].effect) == ("missing_effect", "coulomb")

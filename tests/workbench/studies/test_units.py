@@ -136,6 +136,7 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Study]:
     return made(folder / "si", SI), made(folder / "other", OTHER)
 
 
+@pytest.mark.nightly
 def test_the_same_study_in_other_units_has_the_same_fit(pair: tuple[Study, Study]) -> None:
     si, other = map(compare, pair)
     assert numbers(other) == pytest.approx(numbers(si), rel=1e-9)

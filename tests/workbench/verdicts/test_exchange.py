@@ -98,6 +98,7 @@ def held_harder_at_low_speed(x: np.ndarray, v: np.ndarray) -> np.ndarray:
     return found
 
 
+@pytest.mark.nightly
 def test_a_slider_that_holds_harder_at_low_speed_is_offered_for_a_constant_one(
     tmp_path: Path,
 ) -> None:

@@ -75,6 +75,7 @@ def test_a_hidden_effect_is_named_and_nothing_but_noise_is_left(
     assert bench.floor.ratio(verdict.best.fitted.held_out) < 1.1
 
 
+@pytest.mark.nightly
 def test_an_accelerometers_lag_is_not_taken_for_physics() -> None:
     _, verdict = explained(study(), simulated(("acceleration_lag",), 0.05))
     assert verdict.members

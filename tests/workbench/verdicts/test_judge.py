@@ -770,6 +770,25 @@ def test_a_higher_order_without_a_lower_one_is_named() -> None:
     assert name_of(cubic, unaccepted) == "cubic@x"
 
 
+@pytest.mark.parametrize(
+    ("level", "floor", "spring", "named"),
+    [
+        pytest.param(2.0, MOTION, {"gain": 0.985}, "spring@x", id="nearly all"),
+        pytest.param(2.0, MOTION, {"gain": 0.975}, "slip@x", id="less"),
+        pytest.param(2.0, MOTION, {"gain": 0.985, "free": 3}, "slip@x", id="hardly simpler"),
+        pytest.param(2.0, MOTION, {"gain": 0.985, "port": "y"}, "slip@x", id="elsewhere"),
+        pytest.param(1.0, MOTION, {"gain": 0.985}, "slip@x", id="only noise is left"),
+        pytest.param(2.0, PERIODS, {"gain": 0.985}, "slip@x", id="the noise is known"),
+    ],
+)
+def test_a_contact_that_hardly_slips_is_named_as_the_spring_that_it_is(
+    level: float, floor: NoiseFloor, spring: dict[str, Any], named: str
+) -> None:
+    label = f"spring@{spring.pop('port', 'x')}"
+    slip = best("slip@x", error=level, free=4, gain=1.0)
+    assert name_of(slip, row(label, level * 1.2, **spring), error=9.0, floor=floor) == named
+
+
 @pytest.mark.parametrize(("outputs", "told_apart"), [(1, False), (2, True)])
 def test_a_late_input_is_a_late_output_where_there_is_one_of_each(
     outputs: int, *, told_apart: bool

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rigwatch.physics.engine.compile import all_cores, turns
-from rigwatch.workbench.explain.explain import _by_pairs, ranking
+from rigwatch.workbench.explain.explain import _by_pairs, _unless_open, ranking
+from rigwatch.workbench.explain.explanation import explanation
 from rigwatch.workbench.explain.sets import pairs
 from rigwatch.workbench.explain.sets.pairs import Pair, _pair, likely_pairs, two_effects
 from rigwatch.workbench.explain.verdict import judge
@@ -106,6 +107,19 @@ def test_both_are_named_and_the_ranking_shows_each_alone(bench, rows):
     assert len(labels) == len(set(labels))
 
 
+def test_a_pair_is_undetermined_if_one_may_have_no_strength(bench, rows):
+    verdict = two_effects(bench, rows, judge(bench.base, rows, bench.floor), no_progress)
+    found = explanation(bench, rows, verdict)
+    assert set(found.together) == set(PAIR)
+    assert _unless_open(found, verdict) is found
+    friction = found.together["coulomb@load"]
+    none = dataclasses.replace(friction["Fc"], interval=(-0.01, friction["Fc"].value))
+    open_one = found.together | {"coulomb@load": friction | {"Fc": none}}
+    doubted = _unless_open(dataclasses.replace(found, together=open_one), verdict)
+    assert (doubted.verdict, doubted.wrong_probability) == ("undetermined", None)
+    assert doubted.text.endswith("but the interval of Fc of coulomb@load holds 0")
+
+
 def test_a_pair_that_leaves_more_than_noise_is_not_named(bench, rows):
     alone = judge(bench.base, rows, bench.floor)
     others = [row for row in rows if row.label not in PAIR]
@@ -152,6 +166,7 @@ def test_a_second_effect_is_named_where_noise_hides_most_of_what_the_first_leave
     assert {found.members[0], found.second[0]} == set(PAIR)
 
 
+@pytest.mark.nightly
 def test_a_part_of_the_residual_speaks_for_a_pair_only_if_it_leaves_nothing(bench, rows):
     alone, quiet = named_alone(bench, rows), along_motion(bench, 1 / 1.2)
     assert two_effects(quiet, rows, alone, no_progress, tolerant=False) is alone

@@ -6,6 +6,7 @@ So is what a score to first order underrates.
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from rigwatch.workbench.explain.explain import explain
 from tests.workbench.dampers import damper, effect
@@ -99,6 +100,7 @@ def filling(seed: int, samples: int = 128) -> dict[str, np.ndarray]:
     return {"h_1": read[:, 0], "h_2": read[:, 1]}
 
 
+@pytest.mark.nightly
 def test_a_zero_that_is_off_is_named_although_the_root_of_a_jet_hides_it(tmp_path: Path) -> None:
     logs, units = [filling(seed) for seed in (0, 1)], {"h_1": "m", "h_2": "m"}
     found = explain(studied(tmp_path, CASCADE, logs[:1], logs[1:], units, rates=[0.5, 0.5]))

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from rigwatch.wire.kernel import kernel
 from rigwatch.workbench.compare.preparation import open_bench
@@ -79,6 +80,7 @@ def run(seed: int, strength: float, samples: int = 4096, machine: Machine = slid
     return {"u": u, "x": moved[:, 0], "a": moved[:, 1]}
 
 
+@pytest.mark.nightly
 def test_presliding_and_centre_of_a_slide_that_binds_are_found(tmp_path: Path) -> None:
     made = studied(tmp_path, MODEL, [run(0, 20.0)], [run(1, 20.0)], UNITS, rates=[RATE, RATE])
     bench = open_bench(with_healthy(made, run(2, 0.0), UNITS, RATE))
@@ -101,6 +103,7 @@ def test_presliding_and_centre_of_a_slide_that_binds_are_found(tmp_path: Path) -
     assert all(verdict.best.label in row.cosines for row in rows if row is not verdict.best)
 
 
+@pytest.mark.nightly
 def test_presliding_of_a_slide_that_binds_on_one_side_is_found(tmp_path: Path) -> None:
     logs = [run(seed, holds, machine=touched) for seed, holds in ((0, 0.6), (1, 0.6), (2, 0.0))]
     made = studied(tmp_path, MODEL, logs[:1], logs[1:2], UNITS, rates=[RATE, RATE])

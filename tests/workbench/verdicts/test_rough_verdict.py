@@ -10,6 +10,7 @@ import pytest
 from rigwatch.workbench.data.noise.error_spectrum import ErrorSpectrum
 from rigwatch.workbench.data.noise.noise_floor import NoiseFloor
 from rigwatch.workbench.explain.adequacy import unchecked
+from rigwatch.workbench.explain.explain import _another_before
 from rigwatch.workbench.explain.rough_verdict import (
     acts_alone,
     leaves_much,
@@ -91,11 +92,36 @@ def test_more_may_be_left_where_no_second_effect_explains_that(
     assert told == (alone and word == "missing_effect")
 
 
-def test_a_share_above_the_floor_hides_nothing_where_the_error_is_known_by_frequency() -> None:
+def test_where_the_error_is_known_by_frequency_only_what_is_far_above_the_floor_is_more() -> None:
+    """Beside dry friction a cubic spring left twice the floor, 2 % beyond the model's own error."""
     known = replace(FLOOR, own_error=ErrorSpectrum(np.ones((11, 1))))
 
     assert leaves_some(left(4.0), FLOOR, naming(1.3))
     assert not leaves_some(left(4.0), known, naming(1.3))
+    assert leaves_some(left(9.0), known, naming(1.6))
+
+
+def explained(label: str, times: float, *alike: str, accepted: bool = True) -> Any:
+    """An explanation that names an effect, which leaves so many noise floors."""
+    row = SimpleNamespace(label=label, accepted=accepted, fitted=left(times))
+    told = SimpleNamespace(ranking=[SimpleNamespace(class_=list(alike))], rivals=[])
+    return SimpleNamespace(rows=[row], explanation=told, bench=SimpleNamespace(floor=FLOOR))
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "before"),
+    [
+        pytest.param(explained("a@x", 3.0), explained("b@x", 2.0), "a@x", id="another"),
+        pytest.param(explained("a@x", 3.0), explained("a@x", 2.0), "", id="the same"),
+        pytest.param(explained("a@x", 3.0), explained("b@x", 2.0, "a@x"), "", id="of its class"),
+        pytest.param(explained("a@x", 3.0), explained("b@x", 1.2), "", id="little is left"),
+        pytest.param(explained("a@x", 3.0, accepted=False), explained("b@x", 2.0), "", id="none"),
+    ],
+)
+def test_what_led_before_is_a_rival_where_much_is_left(
+    first: Any, second: Any, before: str
+) -> None:
+    assert _another_before(first, second) == before
 
 
 @pytest.mark.parametrize("found", [naming(1.3), naming(2.0, ("cubic_stiffness@load",))])
