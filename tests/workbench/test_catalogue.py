@@ -115,6 +115,16 @@ def test_surroundings_that_are_not_given_are_as_warm_as_the_machine() -> None:
     assert report.run[0].y[-1] == pytest.approx(285.0, abs=0.1)
 
 
+def test_an_input_in_kelvin_may_be_a_difference(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "surrounded.toml"
+    file.write_text(SURROUNDED)
+    main(["model", "check", str(file)])
+    told = "(others: --input NAME=VALUE; ambient if a difference, as a warming: --input ambient=20)"
+    assert told in capsys.readouterr().out
+
+
 def test_parameters_of_which_the_same_is_said_share_a_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -65,8 +65,16 @@ def _of_run(model: "Model", report: "ModelReport") -> list[str]:
     if not model.states:
         return ["  no run is drawn: without states the outputs follow the inputs at once"]
     held = inputs_of_run(model, report)
-    chosen = f", with {held} (others: --input NAME=VALUE)" if held else ""
+    chosen = f", with {held} (others: --input NAME=VALUE{_differences(model)})" if held else ""
     return [f"  a run from the file's starting values{chosen}:"] if report.run else []
+
+
+def _differences(model: "Model") -> str:
+    """How to give an input in kelvin that is no temperature; empty if none is in kelvin."""
+    kelvin = [name for name, own in model.inputs.items() if (own.shown or own.unit) == "K"]
+    if not kelvin:
+        return ""
+    return f"; {', '.join(kelvin)} if a difference, as a warming: --input {kelvin[0]}=20"
 
 
 def _plain(report: "ModelReport") -> dict[str, object]:

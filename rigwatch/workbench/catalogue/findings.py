@@ -17,8 +17,8 @@ def findings(report: ModelReport) -> dict[str, tuple[tuple[str, ...], str]]:
         "start": "no channel measures it: a fit estimates its initial value from the outputs",
         "absolute": "a temperature that multiplies something: 0 degC are 273.15 K; give a"
         " difference in K",
-        "unbounded": "fixed and without bounds, so that a study may give it any value: low = 0.0"
-        " refuses a negative one",
+        "unbounded": "fixed and without bounds, as constants may be: a study can give any value;"
+        " with low = 0.0 a negative one is refused",
         "unread": "no effect of the library uses a variable of this name; theirs are"
         f" {', '.join(sorted(variables_known()))}",
     }

@@ -101,7 +101,9 @@ def _file(files: NewFiles, logs: Logs, model: Model, reading: Matched) -> tuple[
     for path in logs.healthy:
         choices.append(f"healthy: {path.name}")
         lines += _span("healthy", path.stem, Part(0), logs)
-    return "\n".join(lines) + "\n", [*choices, *_not_fitted(logs, model), *_not_held(logs, model)]
+    return "\n".join(lines) + "\n", [
+        *choices, *_kept(logs, model), *_not_fitted(logs, model), *_not_held(logs, model)
+    ]  # fmt: skip
 
 
 def _derive_section(
@@ -125,6 +127,14 @@ def _derive_section(
         lines += ["", "[thin]", f"factor = {factor}", f"edge = {EDGE}"]
         choices.append(f"residuals low-passed alike: every {factor}th sample counts")
     return lines, choices
+
+
+def _kept(logs: Logs, model: Model) -> list[str]:
+    """A remark on the parameters that healthy logs alone determine, if there are any."""
+    kept = [name for name, p in model.parameters.items() if p.kept and not p.fixed]
+    if not (kept and logs.healthy):
+        return []
+    return [f"{', '.join(kept)}: fitted to the healthy log alone, so that no fault moves it"]
 
 
 def _not_fitted(logs: Logs, model: Model) -> list[str]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rigwatch.commands import main
+from rigwatch.physics.engine.equations.model import model_text
 from rigwatch.workbench.data.signals import prepare
 from rigwatch.workbench.study.study import open_study
 from sim_plant.machines import MACHINES, log
@@ -38,6 +39,21 @@ def test_a_copy_of_a_log_does_not_decide_about_it(tmp_path, run, capsys):
     assert new(tmp_path, one, "--healthy", copy) == 2
     assert "found the same samples in one.csv and copy.csv" in capsys.readouterr().err
     assert not (tmp_path / "study").exists()
+
+
+@pytest.mark.parametrize("healthy", [True, False])
+def test_what_the_healthy_log_determines_is_told(
+    tmp_path: Path, run: Table, capsys: pytest.CaptureFixture[str], *, healthy: bool
+) -> None:
+    model = tmp_path / "own.toml"
+    text = model_text("motor").replace("[parameters.b]\n", "[parameters.b]\nkept = true\n")
+    model.write_text(text)
+    one, other = (log(MACHINES["motor"], {}, 0.003, seed) for seed in (1, 2))
+    words = ["--data", str(written(tmp_path / "one.csv", one)), "--model", str(model)]
+    words += ["--healthy", str(written(tmp_path / "may.csv", other))] if healthy else []
+    assert main(["study", "new", str(tmp_path / "study"), *words, *MOTOR[2:]]) == 0
+    told = "b: fitted to the healthy log alone"
+    assert (told in capsys.readouterr().err) == healthy
 
 
 def test_a_study_file_whose_held_out_recording_is_a_copy_is_told_so(tmp_path):
