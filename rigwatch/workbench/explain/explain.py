@@ -249,7 +249,9 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
     rarer = suitable(bench.study)[1]
     by_training = _only_training_may_ask(first)
     asked = told.exchange is None and (_asks_for_rarer(first) or by_training)
-    if not (asked and rarer and tries_rarer(bench.study)):
+    # On another base a parameter may act on no output, so that the study alone does not tell.
+    checked = bench.data.along_motion and bench.data.healthy is not None
+    if checked or not (asked and rarer and tries_rarer(bench.study)):
         return first
     wider = with_whole_library(bench.study)
     rows = rank_all(wider, bench.data, bench.base)
