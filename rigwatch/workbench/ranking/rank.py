@@ -44,6 +44,9 @@ Up to it another effect may be the right one, is fitted and may be named in plac
 """
 BEGUN_AGAIN = 3
 """Most rows that are begun once more from the given values."""
+FAR_SIMPLER, HALF = 2, 0.5
+"""Parameters less than the best's, and share of what it explains to first order, from which a law
+at its port is fitted although others explain more."""
 MOST_MORE = 6
 """Most rows that are fitted although others explain more, to first order."""
 
@@ -89,6 +92,9 @@ def rank(
     if free_run:
         _begin_again(study, data, base, rows, floor, progress)
         _begin_from_best(study, data, base, rows, floor, progress)
+    rest = _far_simpler(rows)
+    _tell(progress, rest, "which has fewer parameters than the best at its port")
+    refit_all(study, data, base, rest, fit_model if enough else fit_with_retry)
     for other in _elsewhere(study, data, rows, floor):
         progress(f"fitting {other.label}, as the best may act there")
         refit(study, data, base, other, fit_from(in_order(rows)[0].fitted))
@@ -197,6 +203,20 @@ def _skipped_for_far_worse(rows: Sequence[Ranked]) -> list[Ranked]:
     far = {r.label for r in rows if r.fitted is not None and r.held_out_error > most}
     waiting = [r for r in rows if r.fitted is None and not r.failure and r.fitted_instead in far]
     return [r for r in waiting if same_family(best, r) and _may_be_it(r)]
+
+
+def _far_simpler(rows: Sequence[Ranked]) -> list[Ranked]:
+    """Unfitted rows at the best's port with two parameters less that explain half as much.
+
+    One with shape enough is any simpler law, as Bouc and Wen's loop is Dahl's, which to first order
+    explains less than a contact of another shape.
+    """
+    best = next(iter(in_order([row for row in rows if row.accepted])), None)
+    if best is None:
+        return []
+    waiting = [r for r in rows if r.fitted is None and not r.failure and r.port == best.port]
+    far = [r for r in waiting if r.free + FAR_SIMPLER <= best.free and r.likely]
+    return [r for r in far if r.explained >= HALF * best.explained]
 
 
 def _take_known(rows: Sequence[Ranked], known: Sequence[Ranked], base: Fitted) -> None:

@@ -30,6 +30,7 @@ from rigwatch.workbench.explain.verdict import Verdict, judge, not_converged
 from rigwatch.workbench.explain.verdict_calibration import CLEAR, probability_wrong
 from rigwatch.workbench.fit import Fitted
 from rigwatch.workbench.ranking import Ranked
+from rigwatch.workbench.ranking.rank import _far_simpler
 from rigwatch.workbench.ranking.ranked import UNFITTABLE
 
 WINDOWS = 40
@@ -787,6 +788,19 @@ def test_a_contact_that_hardly_slips_is_named_as_the_spring_that_it_is(
     label = f"spring@{spring.pop('port', 'x')}"
     slip = best("slip@x", error=level, free=4, gain=1.0)
     assert name_of(slip, row(label, level * 1.2, **spring), error=9.0, floor=floor) == named
+
+
+def test_a_far_simpler_law_is_fitted_before_a_loop_of_any_shape_is_named() -> None:
+    loop = best("loop@x", free=4)
+    others = [
+        row(label, free=free, fitted=False)
+        for label, free in (("slip@x", 2), ("finer@x", 3), ("slip@y", 2))
+    ]
+    weak = row("weak@x", fitted=False)
+    for each in (*others, weak):
+        each.likely, each.explained = True, 0.2 if each is weak else 0.5
+    assert [each.label for each in _far_simpler([loop, *others, weak])] == ["slip@x"]
+    assert _far_simpler(others) == []
 
 
 @pytest.mark.parametrize(("outputs", "told_apart"), [(1, False), (2, True)])
