@@ -19,7 +19,7 @@ from rigwatch.physics.engine.equations import Model
 from rigwatch.physics.engine.fit import with_effects
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
-from rigwatch.workbench.explain.rough_verdict import SHARE
+from rigwatch.workbench.explain.rough_verdict import SHARE, SHARE_ALONE
 from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.fit import Fitted, fit_model, with_kept_free
 from rigwatch.workbench.ranking import Progress, difference
@@ -62,7 +62,9 @@ def undetermined_if_parameters_changed(bench: Bench, found: Verdict, progress: P
     changed = _refitted(bench)
     if changed is None or not _explains_more(bench, fitted, changed, little=little):
         return found
-    if not (found.together or _one_comes_near(bench, fitted)):
+    # Two things may have changed where one effect leaves more than one that acts alone may.
+    stands = not found.together and _left(bench, fitted) <= SHARE_ALONE
+    if stands and not _one_comes_near(bench, fitted):
         return found
     unit = bench.base.told_in
     text = (
