@@ -20,6 +20,7 @@ LONGEST_S, ATTEMPTS = 0.1, 3
 pytestmark = pytest.mark.xdist_group("rogue client")  # two of the tests share a rig
 
 
+@pytest.mark.nightly
 def test_two_hundred_kinds_of_message_change_nothing_without_keys(tmp_path: Path) -> None:
     with attacked(tmp_path, keys=False) as rig:
         rig.attack(list(everything(kinds()))[::7], time.monotonic() + 60.0)

@@ -83,6 +83,7 @@ def test_the_command_says_what_it_did(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "nobody" in capsys.readouterr().err
 
 
+@pytest.mark.nightly
 def test_a_kill_at_any_point_loses_nothing(tmp_path: Path) -> None:
     old = recorded(tmp_path, 0, segments=SEGMENTS)
     recorded(tmp_path, 1)

@@ -155,7 +155,13 @@ def test_26_a_router_that_restarts(rig: BusRig) -> None:
     assert list(map(heard, told)) == [1] * len(told), "once"
 
 
-@pytest.mark.parametrize("seconds", [0.5, 2.5], ids=["short", "longer than the lease"])
+@pytest.mark.parametrize(
+    "seconds",
+    [
+        pytest.param(0.5, id="short"),
+        pytest.param(2.5, id="longer than the lease", marks=pytest.mark.nightly),
+    ],
+)
 def test_27_a_partition(rig: BusRig, seconds: float) -> None:
     """All that a row says is asserted at each attempt.
 

@@ -128,6 +128,7 @@ class SmallDisk:
         self.shell.wait(PATIENCE)
 
 
+@pytest.mark.nightly
 def test_46_a_disk_that_fills(rig: RecordedRig, tmp_path: Path) -> None:
     possible = ["unshare", "-Urm", "true"]
     if shutil.which("unshare") is None or subprocess.run(possible, check=False).returncode:

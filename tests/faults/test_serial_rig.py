@@ -253,6 +253,7 @@ def test_11_a_stuck_sensor(rig: Field, device: SerialDevice) -> None:
     assert alarm.seq - first < 0.4 * RATE
 
 
+@pytest.mark.nightly
 def test_15_a_gain_that_changes(rig: Field, device: SerialDevice) -> None:
     rig.calm(device.device, "departure")
     ready(rig, device)

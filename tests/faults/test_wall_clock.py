@@ -71,6 +71,7 @@ def offset_of(folder: Path) -> Path:
     return folder / "offset"
 
 
+@pytest.mark.nightly
 def test_43_a_clock_that_is_set_back(clocked: tuple[Field, Device], tmp_path: Path) -> None:
     rig, device = clocked
     boot, first, steps = device.boot, device.next_seq, 0

@@ -142,6 +142,7 @@ def test_health_says_whether_the_structure_is_watched(damaged: Record) -> None:
         assert live.idle == "", "a restart begins anew"
 
 
+@pytest.mark.nightly
 def test_a_process_on_a_real_bus_says_the_same(tmp_path: Path, damaged: Record) -> None:
     expected = watched(cuts(damaged, 10))
     with TestRig(tmp_path) as rig:

@@ -129,6 +129,7 @@ def test_only_a_process_whose_source_has_samples_is_started_again_for_having_non
     assert not of_kind(events, "monitor", "ill")
 
 
+@pytest.mark.nightly
 def test_a_process_that_only_waits_for_a_processor_is_not_started_again() -> None:
     # Neither counts a sample; one of them spins behind four others on one core.
     spins = "until = time.monotonic() + 0.1\n    while time.monotonic() < until: pass"

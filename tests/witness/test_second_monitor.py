@@ -68,6 +68,7 @@ def watched(tmp_path: Path) -> Iterator[Watched]:
         yield made
 
 
+@pytest.mark.nightly
 def test_61_a_second_monitor_is_an_alarm_until_one_is_left(watched: Watched) -> None:
     def told() -> float:
         """From the second monitor's token to the alarm's stamp [s]; it ends again."""
