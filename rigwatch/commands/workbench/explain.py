@@ -49,6 +49,7 @@ def _line(found: dict[str, Any]) -> str:
 
 
 def _run_one(arguments: argparse.Namespace, folder: Path) -> int:
+    from rigwatch.workbench.data import predicts_along_motion
     from rigwatch.workbench.explain import as_data, explain, tries_rarer, with_whole_library
     from rigwatch.workbench.ranking import suitable
     from rigwatch.workbench.report import explanation_lines, next_step
@@ -59,7 +60,8 @@ def _run_one(arguments: argparse.Namespace, folder: Path) -> int:
         study = with_whole_library(study)
     found = explain(study, progress=say)
     following = next_step(found, f"{folder}")
-    waiting = not (found.tried_rarer or tries_rarer(study))
+    tries = tries_rarer(study, along_motion=predicts_along_motion(study))
+    waiting = not (found.tried_rarer or tries)
     rarer = suitable(study)[1] if found.verdict == "unknown_effect" and waiting else []
     if rarer:
         following = RARER.format(count=len(rarer), study=folder)

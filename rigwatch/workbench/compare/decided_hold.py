@@ -17,7 +17,15 @@ from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.preparation import Bench, bench_of
 from rigwatch.workbench.data import port_sizes, scale_of_several
 from rigwatch.workbench.fit import explains_more, fit_model, may_hide_slow, with_hold_beside
-from rigwatch.workbench.ranking import Progress, Ranked, in_order, no_progress, rank, refit
+from rigwatch.workbench.ranking import (
+    Progress,
+    Ranked,
+    best_accepted,
+    in_order,
+    no_progress,
+    rank,
+    refit,
+)
 from rigwatch.workbench.study import Held, Study
 
 SLOW = "lag"
@@ -55,7 +63,7 @@ def with_hold_decided(
         progress: called with a line of text as each fit begins.
     """
     as_found = Decided(bench, rows)
-    best = next(iter(in_order([row for row in rows if row.accepted])), None)
+    best = best_accepted(rows)
     if best is None and bench.floor.reached(bench.base.held_out):
         return as_found
     if _is_undetermined(bench) or not may_hide_slow(bench.study, bench.data):

@@ -41,7 +41,7 @@ def unweighed(
         slope = slopes.get(strength, 0.0)
         share = slope * at[name] / size if size else 0.0
         if name not in given and abs(share) >= MATTERS:
-            label = f"{placement.effect.strength} of {placement.name}@{placement.port}"
+            label = f"{placement.effect.strength} of {placement.label}"
             text = f"{label} moves by {share:.2g} % for each percent of {_told(model, name)}"
             if abs(share - 1) <= IN_PROPORTION and not own.neutral:
                 by_mass = (slope * model.parameters[name].deviation) ** 2

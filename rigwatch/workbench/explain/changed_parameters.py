@@ -13,15 +13,13 @@ model's own spring comes near. So an effect stands that no single parameter come
 
 from dataclasses import replace
 
-from msgspec import structs
-
 from rigwatch.physics.engine.equations import Model
 from rigwatch.physics.engine.fit import with_effects
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.explain.rough_verdict import SHARE, SHARE_ALONE
 from rigwatch.workbench.explain.verdict import Verdict
-from rigwatch.workbench.fit import Fitted, fit_model, with_kept_free
+from rigwatch.workbench.fit import Fitted, fit_model, with_free, with_kept_free
 from rigwatch.workbench.ranking import Progress, difference
 
 THE_SAME = 1e-3
@@ -59,7 +57,7 @@ def undetermined_if_parameters_changed(bench: Bench, found: Verdict, progress: P
         return found
     named = " and ".join([best.label, *found.second[:1]])
     progress(f"comparing {named} with changed parameters of the model")
-    changed = _refitted(bench)
+    changed = _refitted(bench, with_kept_free(bench.study.model))
     if changed is None or not _explains_more(bench, fitted, changed, little=little):
         return found
     # Two things may have changed where one effect leaves more than one that acts alone may.
@@ -82,30 +80,20 @@ def _one_comes_near(bench: Bench, named: Fitted) -> bool:
 
     One that leaves the same is the effect itself, as the model's own spring is.
     """
-    model = bench.study.model
-    for name in (name for name, p in model.parameters.items() if p.kept):
-        one = structs.replace(model.parameters[name], fixed=False)
-        loose = structs.replace(model, parameters={**model.parameters, name: one})
-        changed = _refitted(bench, loose)
-        if changed is None or _is_as_large(changed, named):
-            continue
-        if _left(bench, changed) <= _left(bench, named) + SHARE:
-            return True
-    return False
+    model, near = bench.study.model, _left(bench, named) + SHARE
+    kept = (name for name, p in model.parameters.items() if p.kept)
+    fits = (_refitted(bench, with_free(model, [name])) for name in kept)
+    others = (fit for fit in fits if fit is not None and not _is_as_large(fit, named))
+    return any(_left(bench, fit) <= near for fit in others)
 
 
 def _is_as_large(one: Fitted, other: Fitted) -> bool:
     return abs(one.held_out_error / other.held_out_error - 1) < THE_SAME
 
 
-def _refitted(bench: Bench, model: Model | None = None) -> Fitted | None:
-    """The model without the effect, its kept parameters free; None if it cannot be fitted.
-
-    Args:
-        bench: the study.
-        model: with others free.
-    """
-    loose = replace(bench.study, model=model or with_kept_free(bench.study.model))
+def _refitted(bench: Bench, model: Model) -> Fitted | None:
+    """The study's model without the effect, some kept parameters free; None if it has no fit."""
+    loose = replace(bench.study, model=model)
     data = replace(bench.data, train=with_effects(bench.study.model, bench.data.train))
     start, scale = bench.base.train.values(), bench.base.train.scale
     try:

@@ -37,7 +37,12 @@ from rigwatch.workbench.explain.credibility import (
     unless_resampled,
 )
 from rigwatch.workbench.explain.exchange import Exchange, exchange
-from rigwatch.workbench.explain.explanation import STRENGTH_TOLD, Explanation, explanation
+from rigwatch.workbench.explain.explanation import (
+    STRENGTH_TOLD,
+    Explanation,
+    explanation,
+    holds_neutral,
+)
 from rigwatch.workbench.explain.lower_floor import with_lower_floor
 from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
 from rigwatch.workbench.explain.only_training import SHOWN, undetermined_if_training_asks
@@ -79,7 +84,7 @@ BY_CHANCE = 0.05
 """Probability below which a rarer effect's score is more than chance."""
 HALF = 0.5
 """Share of an effect's error above noise that a rarer one in its place may leave."""
-OPEN_STRENGTH = "but the interval of {name} of {label} holds"
+OPEN_STRENGTH = "but the interval of {name} of {label} holds {neutral:g}"
 BY_ITSELF = "with the training alone {label} leads, and both leave far more than noise"
 BASE_NOT_CONVERGED = "{why}, but with the effect only noise is left"
 SECOND_PASS = "the effect was found in a second pass"
@@ -212,13 +217,11 @@ def _unless_open(found: Explanation, verdict: Verdict) -> Explanation:
     if found.verdict != "missing_effect" or not found.together or verdict.together is None:
         return found
     for placement in verdict.together.placements:
-        label, effect = f"{placement.name}@{placement.port}", placement.effect
-        p, own = effect.parameters[effect.strength], found.together.get(label, {})
-        value = own.get(effect.strength)
-        interval = value.interval if value is not None else None
-        if interval is not None and interval[0] <= p.neutral <= interval[1]:
-            text = f"{found.text}; {OPEN_STRENGTH.format(label=label, name=effect.strength)}"
-            return _unsure(replace(found, text=f"{text} {p.neutral:g}"))
+        label, effect = placement.label, placement.effect
+        if holds_neutral(placement, found.together.get(label, {})):
+            neutral = effect.parameters[effect.strength].neutral
+            told = OPEN_STRENGTH.format(label=label, name=effect.strength, neutral=neutral)
+            return _unsure(replace(found, text=f"{found.text}; {told}"))
     return found
 
 
@@ -249,9 +252,8 @@ def _with_rarer(first: Explained, progress: Progress) -> Explained:
     rarer = suitable(bench.study)[1]
     by_training = _only_training_may_ask(first)
     asked = told.exchange is None and (_asks_for_rarer(first) or by_training)
-    # On another base a parameter may act on no output, so that the study alone does not tell.
-    checked = bench.data.along_motion and bench.data.healthy is not None
-    if checked or not (asked and rarer and tries_rarer(bench.study)):
+    tries = tries_rarer(bench.study, along_motion=bench.data.along_motion)
+    if not (asked and rarer and tries):
         return first
     wider = with_whole_library(bench.study)
     rows = rank_all(wider, bench.data, bench.base)

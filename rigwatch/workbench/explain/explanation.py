@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from rigwatch.physics.engine.equations import Placement
 from rigwatch.physics.engine.search import at_bound
 from rigwatch.workbench.compare import Bench, Comparison, added_variances, comparison, unweighed
 from rigwatch.workbench.experiment import Experiment, propose
@@ -199,7 +200,7 @@ def _together(bench: Bench, verdict: Verdict) -> dict[str, dict[str, Value]]:
     more = added_variances(bench.study, bench.data, bench.bare, fitted)
     every = as_written(values(fitted.train, more), fitted.compiled.system)
     missing = fitted.placements[len(bench.base.placements) :]
-    found = {f"{each.name}@{each.port}": each.own(every) for each in missing}
+    found = {each.label: each.own(every) for each in missing}
     # The text names another of the class than the set has: nothing is known of it in that set.
     return found if best.label in found else {}
 
@@ -296,6 +297,14 @@ def _row(row: Ranked, alike: list[str], more: Mapping[str, float] | None = None)
     )
 
 
+def holds_neutral(placement: Placement, own: Mapping[str, Value]) -> bool:
+    """Whether the interval of an effect's strength holds its neutral value; `own`: its values."""
+    name = placement.effect.strength
+    interval = own[name].interval if name in own else None
+    neutral = placement.effect.parameters[name].neutral
+    return interval is not None and interval[0] <= neutral <= interval[1]
+
+
 def _with_open_strength(row: Ranked, found: dict[str, Value]) -> dict[str, Value]:
     """The values, with a note at the strength of an accepted effect if its interval is open.
 
@@ -305,8 +314,7 @@ def _with_open_strength(row: Ranked, found: dict[str, Value]) -> dict[str, Value
     assert row.fitted is not None
     effect, prefix = row.placement.effect, row.placement.prefix
     name, neutral = prefix + effect.strength, effect.parameters[effect.strength].neutral
-    interval = found[name].interval if name in found else None
-    if not row.accepted or interval is None or not interval[0] <= neutral <= interval[1]:
+    if not (row.accepted and holds_neutral(row.placement, row.placement.own(found))):
         return found
     if neutral_strength(row.fitted.train, row.placement) is not None:
         return found | {name: replace(found[name], note=NOT_NEUTRAL.format(neutral=neutral))}

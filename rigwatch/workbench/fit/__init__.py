@@ -25,6 +25,7 @@ from rigwatch.workbench.fit.fitted_model import (
 from rigwatch.workbench.fit.free_run import free_run
 from rigwatch.workbench.fit.healthy_parameters import (
     poorly_determined,
+    with_free,
     with_healthy_parameters,
     with_kept_free,
     with_values,
@@ -95,6 +96,7 @@ __all__ = [
     "trained",
     "values",
     "values_with",
+    "with_free",
     "with_healthy_parameters",
     "with_healthy_reference",
     "with_healthy_remainder",

@@ -143,8 +143,13 @@ def _scale_of(p: Parameter) -> float:
 
 def with_kept_free(model: Model, names: Collection[str] = ()) -> Model:
     """The model with its kept parameters and those named set free."""
+    return with_free(model, {*names, *(name for name, p in model.parameters.items() if p.kept)})
+
+
+def with_free(model: Model, names: Collection[str]) -> Model:
+    """The model with the parameters named set free."""
     free = {
-        name: structs.replace(p, fixed=p.fixed and not p.kept and name not in names)
+        name: structs.replace(p, fixed=p.fixed and name not in names)
         for name, p in model.parameters.items()
     }
     return structs.replace(model, parameters=free)

@@ -14,7 +14,14 @@ from rigwatch.workbench.fit import Fitted, fit_model, fit_with_retry
 from rigwatch.workbench.ranking.acceptance import MATERIAL, NEAR
 from rigwatch.workbench.ranking.candidates import candidates
 from rigwatch.workbench.ranking.fit_selection import LEVEL, select_for_fit
-from rigwatch.workbench.ranking.ranked import SAME, Ranked, error_ratio, in_order, same_family
+from rigwatch.workbench.ranking.ranked import (
+    SAME,
+    Ranked,
+    best_accepted,
+    error_ratio,
+    in_order,
+    same_family,
+)
 from rigwatch.workbench.ranking.refitting import (
     Fitting,
     Progress,
@@ -195,10 +202,9 @@ def _skipped_for_far_worse(rows: Sequence[Ranked]) -> list[Ranked]:
     A delay of the drive resembles a lag there to first order. If the best is the sensor's delay,
     that is as good, and the lag is not, the drive's must be tried, too.
     """
-    accepted = in_order([row for row in rows if row.accepted])
-    if not accepted:
+    best = best_accepted(rows)
+    if best is None:
         return []
-    best = accepted[0]
     most = MUCH_WORSE * best.held_out_error
     far = {r.label for r in rows if r.fitted is not None and r.held_out_error > most}
     waiting = [r for r in rows if r.fitted is None and not r.failure and r.fitted_instead in far]
@@ -211,7 +217,7 @@ def _far_simpler(rows: Sequence[Ranked]) -> list[Ranked]:
     One with shape enough is any simpler law, as Bouc and Wen's loop is Dahl's, which to first order
     explains less than a contact of another shape.
     """
-    best = next(iter(in_order([row for row in rows if row.accepted])), None)
+    best = best_accepted(rows)
     if best is None:
         return []
     waiting = [r for r in rows if r.fitted is None and not r.failure and r.port == best.port]
@@ -267,7 +273,7 @@ def _best_and_what_it_leaves(
     study: Study, data: Data, rows: Sequence[Ranked], floor: NoiseFloor
 ) -> tuple[Ranked | None, float]:
     """The best accepted row, and its held-out error over the floor; None without a fitted one."""
-    best = next(iter(in_order([row for row in rows if row.accepted])), None)
+    best = best_accepted(rows)
     if best is None or best.fitted is None:
         return None, 0.0
     return best, own_floor(study, data, floor, best).ratio(best.fitted.held_out)

@@ -181,6 +181,11 @@ def in_order(rows: Sequence[Ranked]) -> list[Ranked]:
     return sorted(rows, key=_order)
 
 
+def best_accepted(rows: Sequence[Ranked]) -> Ranked | None:
+    """The accepted row with the smallest held-out error; None without one."""
+    return next(iter(in_order([row for row in rows if row.accepted])), None)
+
+
 def _order(row: Ranked) -> tuple[int, float, float]:
     return (
         0 if row.accepted else 1 if row.fitted else 2,

@@ -208,7 +208,7 @@ def _no_longer_needed(bench: Bench) -> str:
         strength = neutral_strength(own.train, placement)
         if strength is not None and not _needed(bench, placement):
             found.append(
-                f"; {placement.name}@{placement.port} is no longer needed ({strength}): to take it"
+                f"; {placement.label} is no longer needed ({strength}): to take it"
                 f" out, `rigwatch undo {bench.study.folder}` {count} times, then add what came"
                 " after it"
             )

@@ -314,7 +314,7 @@ def varied(study: Study, variants: Sequence[str]) -> Study:
     written = _written(study.folder, file, study.own_files)
     named = {element.label for element in elements_of(variants)}
     for element in study.elements:
-        if f"{element.name}@{element.port}" in named:
+        if element.label in named:
             written = with_element(written, element)
     model, holds = _as_studied(written, file)
     model = with_known_values(model, file)

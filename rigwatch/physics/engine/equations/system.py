@@ -57,6 +57,11 @@ class Placement:
     beyond: str = ""
 
     @property
+    def label(self) -> str:
+        """The effect and its port, as "effect@port"."""
+        return f"{self.name}@{self.port}"
+
+    @property
     def entry(self) -> str:
         """Name of the port where it enters the equations."""
         return beyond_port(self.port, self.beyond) if self.beyond else self.port

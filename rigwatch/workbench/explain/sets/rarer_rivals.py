@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rigwatch.workbench.compare import Bench
-from rigwatch.workbench.data import predicts_along_motion
 from rigwatch.workbench.explain.contradicting import FAVOURED
 from rigwatch.workbench.explain.only_training import SHOWN
 from rigwatch.workbench.explain.verdict import Verdict
@@ -41,7 +40,7 @@ def with_rarer_rivals(
         progress: called with a line of text as each fit begins.
     """
     best = verdict.best
-    free_run = not bench.data.along_motion and tries_rarer(bench.study)
+    free_run = not (bench.data.along_motion or bench.study.model.rough)
     if verdict.word != "missing_effect" or best is None or best.fitted is None or not free_run:
         return rows, verdict
     named = [row for row in rows if row.label in (best.label, *verdict.beside)]
@@ -73,9 +72,15 @@ def _of_training(best: Ranked, better: Sequence[Ranked]) -> str:
     return f"{most:.3g} {unit} of the training, {best.label} {own:.3g}"
 
 
-def tries_rarer(study: Study) -> bool:
-    """Whether rarer effects are tried by themselves where no usual one explains the error."""
-    checked = predicts_along_motion(study) and bool(study.file.healthy)
+def tries_rarer(study: Study, *, along_motion: bool) -> bool:
+    """Whether rarer effects are tried by themselves where no usual one explains the error.
+
+    Args:
+        study: as written, or on a base that was found.
+        along_motion: how its recordings are predicted. On another base a parameter may act on no
+            output, so that the study alone would not tell.
+    """
+    checked = along_motion and bool(study.file.healthy)
     return not (checked or study.model.rough)
 
 

@@ -89,7 +89,7 @@ def with_hold_beside(
     trials, line = min(lines, key=lambda pair: pair[1].size)
     best = best_hold(trials, line, quiet_scale(data.train))
     placement = trials.placements[-1]
-    label = f"{placement.name}@{placement.port}"
+    label = placement.label
     return label, _held_as_chosen(free, data, line, best), best.fitted
 
 
